@@ -1,0 +1,99 @@
+//! A capture: calibrated frames on disk, and the views loaded from them.
+
+use crate::{Camera, CaptureError, Image};
+use nalgebra::{Point3, Vector3};
+use std::path::PathBuf;
+
+/// An axis-aligned box in world units.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Aabb {
+    /// The corner with the smallest coordinates.
+    pub min: Point3<f64>,
+    /// The corner with the largest coordinates.
+    pub max: Point3<f64>,
+}
+
+/// Calibrated frames of one object.
+#[derive(Clone, Debug)]
+pub struct Capture {
+    /// In file order; views are chosen by their position here.
+    pub frames: Vec<Frame>,
+    /// The object's box, where the source gives one.
+    pub aabb: Option<Aabb>,
+    /// Metres per world unit, where known.
+    pub unit: Option<f64>,
+}
+
+/// One calibrated photograph on disk.
+#[derive(Clone, Debug)]
+pub struct Frame {
+    /// The image file.
+    pub image_path: PathBuf,
+    /// The silhouette file, where there is one.
+    pub mask_path: Option<PathBuf>,
+    /// Intrinsics and pose; its size is the image's.
+    pub camera: Camera,
+    /// Unit direction towards the light, in the world, where known.
+    pub light_direction: Option<Vector3<f64>>,
+    /// Relative exposure, where known.
+    pub exposure: Option<f64>,
+}
+
+/// How views are loaded.
+#[derive(Clone, Copy, Debug)]
+pub struct LoadOptions {
+    /// Whole factor by which images, mattes and cameras are reduced (area average).
+    pub downscale: usize,
+}
+
+/// A photograph in memory, with all that later stages need to know of it.
+#[derive(Clone, Debug)]
+pub struct View {
+    /// Position of its frame in the capture.
+    pub index: usize,
+    /// File stem of its image.
+    pub name: String,
+    /// 8-bit sRGB as photographed (alpha composited on black where the file has one).
+    pub image: Image<[u8; 3]>,
+    /// Coverage of each pixel by the object, 255 = all; the object is where it is ≥ 128.
+    pub matte: Image<u8>,
+    /// Whether nothing of the object lies outside the frame: then outside is background,
+    /// otherwise unknown.
+    pub is_complete: bool,
+    /// Intrinsics and pose, for exactly this image size.
+    pub camera: Camera,
+}
+
+impl Aabb {
+    /// The centre.
+    pub fn center(&self) -> Point3<f64> {
+        nalgebra::center(&self.min, &self.max)
+    }
+
+    /// Edge lengths.
+    pub fn size(&self) -> Vector3<f64> {
+        self.max - self.min
+    }
+
+    /// Length of the space diagonal.
+    pub fn diagonal(&self) -> f64 {
+        self.size().norm()
+    }
+
+    /// The smallest box around `points`; `None` without points.
+    pub fn around(points: impl IntoIterator<Item = Point3<f64>>) -> Option<Self> {
+        points.into_iter().fold(None, |found: Option<Self>, p| {
+            Some(found.map_or(Self { min: p, max: p }, |b| Self { min: b.min.inf(&p), max: b.max.sup(&p) }))
+        })
+    }
+}
+
+impl Capture {
+    /// Loads the frames at the given positions.
+    ///
+    /// # Errors
+    /// Names the file that is missing, truncated, of another size than its camera, or empty.
+    pub fn load_views(&self, _positions: &[usize], _options: &LoadOptions) -> Result<Vec<View>, CaptureError> {
+        unreachable!("written by the capture stage")
+    }
+}
