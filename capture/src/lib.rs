@@ -6,10 +6,12 @@
 
 mod camera;
 mod capture_set;
+pub mod contour;
 mod error;
 mod image;
 
 pub use camera::{Camera, Distortion, Intrinsics, Projected, Ray};
 pub use capture_set::{Aabb, Capture, Frame, LoadOptions, View};
+pub use contour::{BinaryMatte, ContourOptions, Contours, Surround};
 pub use error::CaptureError;
 pub use image::Image;
