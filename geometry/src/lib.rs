@@ -9,5 +9,5 @@ pub mod mesh;
 
 pub use depth::DepthMap;
 pub use error::GeometryError;
-pub use hull::{Hull, HullOptions, HullReport, visual_hull};
+pub use hull::{Hull, HullChoice, HullOptions, HullReport, choose_hull, visual_hull};
 pub use mesh::{Mesh, MeshCheck, TexturedMesh};

@@ -11,13 +11,18 @@ fn check_ring(name: &str) {
     let Some(folder) = shared(name) else { return };
     let views = middlebury(&folder);
     for (consensus, grow_px) in [(0, 0.0), (0, 0.5), (1, 0.0), (1, 0.5), (2, 0.0)] {
-    let start = Instant::now();
-    let hull = visual_hull(&views, &HullOptions { consensus, grow_px, ..HullOptions::default() }).unwrap();
-    let seconds = start.elapsed().as_secs_f64();
-    let check = hull.mesh.check().unwrap();
-    let iou = mean_silhouette_iou(&hull.mesh, &views);
-    println!("{name} {consensus} {grow_px}: IoU {iou:.4}, {seconds:.2} s, {check:?}\n{:?} {:?} {}", hull.report, hull.aabb, views.iter().filter(|v| v.is_complete).count());
-    assert!(check.closed_manifold && check.volume > 0.0);
+        let start = Instant::now();
+        let hull = visual_hull(&views, &HullOptions { consensus, grow_px, ..HullOptions::default() }).unwrap();
+        let seconds = start.elapsed().as_secs_f64();
+        let check = hull.mesh.check().unwrap();
+        let iou = mean_silhouette_iou(&hull.mesh, &views);
+        println!(
+            "{name} {consensus} {grow_px}: IoU {iou:.4}, {seconds:.2} s, {check:?}\n{:?} {:?} {}",
+            hull.report,
+            hull.aabb,
+            views.iter().filter(|v| v.is_complete).count()
+        );
+        assert!(check.closed_manifold && check.volume > 0.0);
     }
 }
 

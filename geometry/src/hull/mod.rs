@@ -17,6 +17,7 @@
 //!   more than a few planes of nodes. The result does not depend on the number of threads.
 
 mod bounds;
+mod choose;
 mod cone;
 mod extract;
 mod grid;
@@ -26,6 +27,7 @@ mod table;
 
 use crate::{GeometryError, Mesh};
 use capture::{Aabb, BinaryMatte, View};
+pub use choose::{HullChoice, HullTrial, choose_hull};
 use cone::Cone;
 use grid::Grid;
 use rayon::prelude::*;
@@ -123,7 +125,7 @@ pub fn visual_hull(views: &[View], options: &HullOptions) -> Result<Hull, Geomet
     let allowed = options.consensus as u32;
     let aabb = match options.aabb {
         Some(aabb) => aabb,
-        None => bounds::find_box(views, options.binary, allowed)?,
+        None => bounds::find_box(views, options.grow_px, allowed)?,
     };
     let cell = cell_size(views, &aabb, options.resolution);
     let contour_s = start.elapsed().as_secs_f64();
