@@ -52,7 +52,8 @@ fn torus_box() -> Aabb {
 }
 
 fn write_torus(args: &[String]) {
-    let [resolution, masks, out] = args else {
+    // Cargo adds an argument of its own.
+    let [resolution, masks, out, ..] = args else {
         eprintln!("usage: --write RESOLUTION masks|masks_aa OUT.ply");
         return;
     };

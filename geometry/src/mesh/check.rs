@@ -129,11 +129,7 @@ impl Mesh {
     fn remove_isolated_vertices(&mut self) {
         let mut names = vec![u32::MAX; self.positions.len()];
         self.faces.iter().flatten().for_each(|&v| names[v as usize] = 0);
-        let mut kept = 0;
-        for name in names.iter_mut().filter(|name| **name == 0) {
-            *name = kept;
-            kept += 1;
-        }
+        (0u32..).zip(names.iter_mut().filter(|name| **name == 0)).for_each(|(kept, name)| *name = kept);
         let mut name_of = names.iter();
         self.positions.retain(|_| name_of.next().is_some_and(|&name| name != u32::MAX));
         self.faces.iter_mut().flatten().for_each(|v| *v = names[*v as usize]);

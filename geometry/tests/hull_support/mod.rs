@@ -1,5 +1,5 @@
 //! Scenes with exact silhouettes, and readers of the shared captures, for the hull tests.
-#![allow(dead_code, unreachable_pub, reason = "each test binary uses its own part")]
+#![allow(dead_code, unreachable_pub, clippy::unwrap_used, reason = "test support; each test binary uses its own part")]
 
 use capture::{Camera, Distortion, Image, Intrinsics, View};
 use nalgebra::{Matrix3, Point2, Point3, Vector3};
