@@ -1,5 +1,7 @@
 //! Hulls of real captures; skipped, saying so, where `shared/data` is absent.
 
+#![allow(clippy::unwrap_used, reason = "a test: failing is what unwrap is for")]
+
 mod hull_support;
 
 use capture::View;
