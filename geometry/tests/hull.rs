@@ -1,5 +1,7 @@
 //! The visual hull against answers derived by hand.
 
+#![allow(clippy::unwrap_used, reason = "a test: failing is what unwrap is for")]
+
 mod hull_support;
 
 use capture::{Aabb, BinaryMatte, Camera, Image, View};
