@@ -20,8 +20,10 @@ mod formats;
 mod image;
 mod load;
 mod masks;
+mod matte;
 mod pixels;
 pub mod silhouette;
+mod votes;
 mod write;
 
 pub use camera::{Camera, Distortion, Intrinsics, Projected, Ray};
@@ -30,4 +32,5 @@ pub use error::CaptureError;
 pub use formats::{CaptureFormat, detect_format};
 pub use image::Image;
 pub use masks::MaskSource;
+pub use matte::{erode, grow, is_binary, signed_distance, smooth};
 pub use pixels::{read_matte, read_rgb, write_matte, write_rgb};
