@@ -1,5 +1,10 @@
 //! Indexed triangle meshes. Triangles are counter-clockwise seen from outside.
 
+pub mod half_edge;
+mod smooth;
+
+pub use smooth::{TaubinOptions, taubin_smooth};
+
 use capture::Aabb;
 use nalgebra::{Point2, Point3, Vector3};
 
