@@ -34,6 +34,7 @@ impl<'a> MipChain<'a> {
     }
 
     /// The texels of `level`, 0 being the atlas; the coarsest built where `level` lies beyond.
+    #[inline]
     pub fn level(&self, level: usize) -> &Image<[f32; 3]> {
         match level.min(self.reduced.len()) {
             0 => self.base,
@@ -43,6 +44,7 @@ impl<'a> MipChain<'a> {
 
     /// The texture at (`x`, `y`) in texels of level 0, outer corner of the first texel (0, 0),
     /// filtered trilinearly for a fractional `level`. Zero of an empty atlas.
+    #[inline]
     pub fn sample(&self, x: f32, y: f32, level: f32) -> [f32; 3] {
         let level = level.min(self.reduced.len() as f32);
         // Also the way out for NaN.
@@ -57,7 +59,11 @@ impl<'a> MipChain<'a> {
             return a;
         }
         let b = bilinear(self.level(fine + 1), x * scale * 0.5, y * scale * 0.5);
-        [0, 1, 2].map(|c| a[c] + fraction * (b[c] - a[c]))
+        let mut out = a;
+        for c in 0..3 {
+            out[c] += fraction * (b[c] - a[c]);
+        }
+        out
     }
 }
 
@@ -70,6 +76,7 @@ pub fn top_level(width: usize, height: usize) -> usize {
 /// The mip level for a footprint whose longer side is the root of `footprint_squared`, in texels;
 /// 0 under magnification. As OpenGL defines it (4.6 core, eq. 8.7), for the distance between
 /// sub-samples.
+#[inline]
 pub fn level_of_footprint(footprint_squared: f32) -> f32 {
     if footprint_squared > 1.0 { 0.5 * footprint_squared.log2() } else { 0.0 }
 }
@@ -86,29 +93,37 @@ fn halved(fine: &Image<[f32; 3]>) -> Image<[f32; 3]> {
         for ((texel, a), b) in row.iter_mut().zip(above.chunks(2)).zip(below.chunks(2)) {
             let ([a0, .., a1] | [a0 @ a1]) = a else { continue };
             let ([b0, .., b1] | [b0 @ b1]) = b else { continue };
-            *texel = [0, 1, 2].map(|c| 0.25 * (a0[c] + a1[c] + b0[c] + b1[c]));
+            for c in 0..3 {
+                texel[c] = 0.25 * (a0[c] + a1[c] + b0[c] + b1[c]);
+            }
         }
     });
     coarse
 }
 
 /// One level at (`x`, `y`) in its own texels, borders repeated.
+#[inline]
 fn bilinear(image: &Image<[f32; 3]>, x: f32, y: f32) -> [f32; 3] {
-    if image.pixels().is_empty() {
+    let (width, texels) = (image.width(), image.pixels());
+    if texels.is_empty() {
         return [0.0; 3];
     }
-    let (x0, x1, s) = neighbours(x, image.width());
+    let (x0, x1, s) = neighbours(x, width);
     let (y0, y1, t) = neighbours(y, image.height());
-    let (above, below) = (image.row(y0), image.row(y1));
-    let (a, b, c, d) = (above[x0], above[x1], below[x0], below[x1]);
-    [0, 1, 2].map(|k| {
+    let (a, b) = (texels[y0 * width + x0], texels[y0 * width + x1]);
+    let (c, d) = (texels[y1 * width + x0], texels[y1 * width + x1]);
+    // Plain loops here and below: `map` over an array is not always inlined, at half the speed.
+    let mut out = [0.0; 3];
+    for k in 0..3 {
         let top = a[k] + s * (b[k] - a[k]);
         let bottom = c[k] + s * (d[k] - c[k]);
-        top + t * (bottom - top)
-    })
+        out[k] = top + t * (bottom - top);
+    }
+    out
 }
 
 /// The two texels either side of `x` and how far it is from the first to the second.
+#[inline]
 fn neighbours(x: f32, size: usize) -> (usize, usize, f32) {
     let last = size - 1;
     let x = (x - 0.5).clamp(0.0, last as f32);
