@@ -2,7 +2,11 @@
 
 use super::samples::{BLOCK_SAMPLES, Patch, Samples};
 use super::setup::{EdgeFace, Linear};
+use crate::resolve::sample_position;
 use std::ops::Range;
+
+/// Sub-samples tested side by side.
+const LANES: usize = 4;
 
 /// No face.
 pub(super) const NONE: u32 = u32::MAX;
@@ -15,6 +19,8 @@ pub(super) struct Nearest {
     inverse_depths: Vec<f64>,
     /// Position in the tile's candidates.
     slots: Vec<u32>,
+    /// Where the columns lie on a regular grid, in pixels.
+    xs: Vec<f64>,
     /// Smallest 1 / depth in each block once the front faces are in; empty before.
     blocks: Vec<f64>,
 }
@@ -37,7 +43,7 @@ impl Nearest {
         tile: usize,
         candidates: impl Iterator<Item = &'f EdgeFace> + Clone,
     ) {
-        self.reset(samples.tile_patch(tile));
+        self.reset(samples.tile_patch(tile), samples.per_side());
         for front in [true, false] {
             for (slot, face) in candidates.clone().enumerate().filter(|(_, face)| face.is_front == front) {
                 self.add(face, slot as u32, samples);
@@ -56,7 +62,9 @@ impl Nearest {
         &self.slots[first..first + columns.len()]
     }
 
-    fn reset(&mut self, patch: Patch) {
+    fn reset(&mut self, patch: Patch, per_side: usize) {
+        self.xs.clear();
+        self.xs.extend(patch.columns.clone().map(|column| sample_position(column, 0, per_side).x));
         let samples = patch.columns.len() * patch.rows.len();
         self.inverse_depths.clear();
         self.inverse_depths.resize(samples, 0.0);
@@ -112,25 +120,31 @@ impl Nearest {
         });
     }
 
-    /// Tests sub-samples on a regular grid.
+    /// Tests sub-samples on a regular grid, a few side by side.
     fn cover_grid(&mut self, part: &Patch, face: &EdgeFace, slot: u32, per_side: usize) {
         let [e0, e1, e2] = &face.edges;
         let [t0, t1, t2] = [threshold(e0), threshold(e1), threshold(e2)];
-        let step = 1.0 / per_side as f64;
         let local = self.local(part);
+        let xs = &self.xs[local.columns.clone()];
         for (row, line) in part.rows.clone().zip(local.rows) {
-            let y = (row as f64 + 0.5) * step;
+            let y = sample_position(0, row, per_side).y;
             let (r0, r1, r2) = (e0[1] * y + e0[2], e1[1] * y + e1[2], e2[1] * y + e2[2]);
             let start = line * self.patch.columns.len();
             let depths = &mut self.inverse_depths[start..][local.columns.clone()];
             let slots = &mut self.slots[start..][local.columns.clone()];
-            for ((column, depth), nearest) in part.columns.clone().zip(depths).zip(slots) {
-                // Through i32: the conversion of 64 bit is slow.
-                let x = (f64::from(column as i32) + 0.5) * step;
-                let (a, b, c) = (e0[0] * x + r0, e1[0] * x + r1, e2[0] * x + r2);
-                let inverse_depth = (a + b + c) * face.inverse_det;
-                if (a >= t0) & (b >= t1) & (c >= t2) & (inverse_depth > *depth) {
-                    (*depth, *nearest) = (inverse_depth, slot);
+            let lanes = xs.chunks(LANES).zip(depths.chunks_mut(LANES)).zip(slots.chunks_mut(LANES));
+            for ((xs, depths), slots) in lanes {
+                // First without a branch, so that lanes share instructions.
+                let (mut inside, mut inverse) = ([false; LANES], [0.0; LANES]);
+                for (k, x) in xs.iter().enumerate() {
+                    let (a, b, c) = (e0[0] * x + r0, e1[0] * x + r1, e2[0] * x + r2);
+                    inverse[k] = (a + b + c) * face.inverse_det;
+                    inside[k] = (a >= t0) & (b >= t1) & (c >= t2) & (inverse[k] > depths[k]);
+                }
+                for k in 0..xs.len() {
+                    if inside[k] {
+                        (depths[k], slots[k]) = (inverse[k], slot);
+                    }
                 }
             }
         }
