@@ -162,7 +162,11 @@ pub(crate) fn is_closed(mesh: &Mesh) -> bool {
             *edges.entry(e).or_insert(0) += 1;
         }
     }
-    edges.iter().all(|(&(a, b), &n)| n == 1 && edges.get(&(b, a)) == Some(&1))
+    let good = |(&(a, b), &n): (&(u32, u32), &i32)| n == 1 && edges.get(&(b, a)) == Some(&1);
+    for e in edges.iter().filter(|&e| !good(e)).take(6) {
+        eprintln!("bad edge at {:?}", mesh.positions[e.0.0 as usize]);
+    }
+    edges.iter().all(good)
 }
 
 #[cfg(test)]
