@@ -282,7 +282,8 @@ impl Flatten<'_> {
             let candidates = subtrees.iter().enumerate().filter(|(_, s)| open(s));
             let largest = candidates.max_by(|a, b| a.1.1.surface_area().total_cmp(&b.1.1.surface_area()));
             let Some((k, &(index, _))) = largest else { break };
-            let BvhNode::Node { child_l_index, child_l_aabb, child_r_index, child_r_aabb, .. } = self.tree[index] else {
+            let BvhNode::Node { child_l_index, child_l_aabb, child_r_index, child_r_aabb, .. } = self.tree[index]
+            else {
                 break;
             };
             subtrees[k] = (child_l_index, child_l_aabb);

@@ -19,7 +19,7 @@ const EAR: u8 = 3;
 /// Metres per modelling unit.
 const SCALE: f64 = 0.13;
 /// Grid cells per modelling unit.
-const CELLS: f64 = 68.0;
+const CELLS: f64 = 52.0;
 /// Where the body's middle lies along x: put onto the turntable's axis.
 const MIDDLE: f64 = 0.19;
 
@@ -27,11 +27,7 @@ type P = Vector3<f64>;
 
 /// Builds the mesh.
 pub(crate) fn build() -> MeshBuilder {
-    build_at(CELLS)
-}
-
-fn build_at(cells: f64) -> MeshBuilder {
-    let grid = Grid::around(P::new(-0.72, -0.62, 0.0), P::new(1.1, 0.62, 1.12), 1.0 / cells);
+    let grid = Grid::around(P::new(-0.72, -0.62, 0.0), P::new(1.1, 0.62, 1.12), 1.0 / CELLS);
     let mut b = extract(&grid, surface);
     let part_of = |f: usize| part_at(nalgebra::center(&b.mesh.corners(f)[0], &b.mesh.corners(f)[1]).coords);
     b.parts = (0..b.mesh.faces.len()).map(part_of).collect();
@@ -235,35 +231,35 @@ fn cloth(q: Vec3, under: Vec3, gold: Vec3) -> Vec3 {
     let v = q.y.atan2(q.z - 0.58) * 0.30;
     let (half_u, half_v) = (0.225, 0.47);
     let edge = (u.abs() - half_u).max(v.abs() - half_v);
-    let fringe = stripe(v.abs() - half_v - 0.02, 0.022, 0.004) * stripe(u, half_u, 0.004) * stripe(wrap(u, 0.018), 0.0055, 0.003);
+    let fringe = stripe(v.abs() - half_v - 0.02, 0.022, 0.004)
+        * stripe(u, half_u, 0.004)
+        * stripe(wrap(u, 0.018), 0.0055, 0.003);
     let mut c = blend(under, gold, fringe);
     if edge > 0.01 {
         return c;
     }
     let (du, dv) = (wrap(u, 0.115), wrap(v, 0.115));
     let flower = (du * du + dv * dv).sqrt() + 0.010 * (6.0 * dv.atan2(du)).cos();
-    let lattice = stripe(wrap(u + v, 0.115) - 0.0575 * 0.0, 0.0, 0.004).max(stripe((du.abs() + dv.abs()) - 0.0575, 0.004, 0.004));
+    let lattice =
+        stripe(wrap(u + v, 0.115) - 0.0575 * 0.0, 0.0, 0.004).max(stripe((du.abs() + dv.abs()) - 0.0575, 0.004, 0.004));
     let mut field = blend(color([142, 20, 34]), color([172, 34, 44]), noise(q * 40.0, 61));
     field = blend(field, gold, lattice);
     field = blend(field, color([238, 222, 190]), 1.0 - step(0.030, 0.005, flower));
     field = blend(field, color([28, 58, 120]), 1.0 - step(0.014, 0.005, flower));
     let border = blend(color([24, 46, 104]), color([236, 220, 186]), {
         let (bu, bv) = (wrap(u, 0.045), wrap(v, 0.047));
-        1.0 - step(0.011, 0.004, if u.abs() - half_u > v.abs() - half_v { bv.hypot(u.abs() - half_u + 0.034) } else { bu.hypot(v.abs() - half_v + 0.034) })
+        1.0 - step(
+            0.011,
+            0.004,
+            if u.abs() - half_u > v.abs() - half_v {
+                bv.hypot(u.abs() - half_u + 0.034)
+            } else {
+                bu.hypot(v.abs() - half_v + 0.034)
+            },
+        )
     });
     let inside = blend(field, border, step(-0.058, 0.003, edge));
     let cord = stripe(edge + 0.006, 0.006, 0.003).max(stripe(edge + 0.060, 0.005, 0.003));
     c = blend(c, blend(inside, gold, cord), 1.0 - step(0.0, 0.004, edge));
     c
-}
-
-#[cfg(test)]
-mod tests {
-    #[test]
-    fn probe() {
-        for c in 58..84 {
-            let b = super::build_at(f64::from(c));
-            println!("{c} closed {}", crate::shape::is_closed(&b.mesh));
-        }
-    }
 }
