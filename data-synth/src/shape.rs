@@ -49,7 +49,7 @@ impl MeshBuilder {
         }
     }
 
-    /// Walls through all `loops` in turn; returns the last.
+    /// Walls through all `loops` in turn.
     pub(crate) fn loft(&mut self, loops: &[Vec<u32>]) {
         for pair in loops.windows(2) {
             self.walls(&pair[0], &pair[1]);

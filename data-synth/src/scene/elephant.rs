@@ -240,8 +240,7 @@ fn cloth(q: Vec3, under: Vec3, gold: Vec3) -> Vec3 {
     }
     let (du, dv) = (wrap(u, 0.115), wrap(v, 0.115));
     let flower = (du * du + dv * dv).sqrt() + 0.010 * (6.0 * dv.atan2(du)).cos();
-    let lattice =
-        stripe(wrap(u + v, 0.115) - 0.0575 * 0.0, 0.0, 0.004).max(stripe((du.abs() + dv.abs()) - 0.0575, 0.004, 0.004));
+    let lattice = stripe(wrap(u + v, 0.115), 0.0, 0.004).max(stripe((du.abs() + dv.abs()) - 0.0575, 0.004, 0.004));
     let mut field = blend(color([142, 20, 34]), color([172, 34, 44]), noise(q * 40.0, 61));
     field = blend(field, gold, lattice);
     field = blend(field, color([238, 222, 190]), 1.0 - step(0.030, 0.005, flower));

@@ -35,8 +35,7 @@ struct Level {
 
 /// Builds the mesh.
 pub(crate) fn build() -> MeshBuilder {
-    let mut b = MeshBuilder::default();
-    b.part = STEPS;
+    let mut b = MeshBuilder { part: STEPS, ..MeshBuilder::default() };
     let platform = steps(&mut b);
     let floor = level(&mut b, FLOOR_Z);
     let ceiling = level(&mut b, CEILING_Z);
