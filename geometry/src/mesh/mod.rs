@@ -2,9 +2,11 @@
 
 mod check;
 pub mod half_edge;
+mod separate;
 mod smooth;
 
 pub use check::MeshCheck;
+pub use separate::separate_sheets;
 pub use smooth::{TaubinOptions, taubin_smooth};
 
 use capture::Aabb;
