@@ -15,6 +15,7 @@
 
 mod camera;
 mod capture_set;
+pub mod doctor;
 mod error;
 mod formats;
 mod image;

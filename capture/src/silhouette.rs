@@ -156,11 +156,21 @@ fn above(score: &Image<f32>, level: f32) -> Image<u8> {
     score.map(|v| if v >= level { 255 } else { 0 })
 }
 
-/// Removes parts smaller than a hundredth of the largest.
+/// Keeps the largest part and those of at least a hundredth of it that lie within the frame: what reaches
+/// in from the border is the room, or the black margin of a digitised frame.
 fn without_specks(mask: &Image<u8>) -> Image<u8> {
     let (sizes, labels) = components(&mask.map(|v| v >= 128));
-    let least = sizes.iter().max().copied().unwrap_or(0) / 100;
-    labels.map(|l| if l > 0 && sizes[l as usize - 1] > least { 255 } else { 0 })
+    let largest = sizes.iter().max().copied().unwrap_or(0);
+    let mut keep: Vec<bool> = sizes.iter().map(|&size| size * 100 >= largest).collect();
+    let (w, h) = (labels.width(), labels.height());
+    let border = (0..w).flat_map(|x| [(x, 0), (x, h - 1)]).chain((0..h).flat_map(|y| [(0, y), (w - 1, y)]));
+    for (x, y) in border {
+        let label = labels.at(x, y) as usize;
+        if label > 0 && sizes[label - 1] < largest {
+            keep[label - 1] = false;
+        }
+    }
+    labels.map(|l| if l > 0 && keep[l as usize - 1] { 255 } else { 0 })
 }
 
 /// What most views agree on.
