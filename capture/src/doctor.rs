@@ -293,7 +293,7 @@ fn findings(found: &CaptureCheck, views: &[View], pairs: &[(&Camera, &Image<u8>)
     let mut ious: Vec<f64> = found.views.iter().map(|v| v.silhouette_iou).collect();
     ious.sort_by(f64::total_cmp);
     let median = ious[ious.len() / 2];
-    let bad = listed(&|v| v.silhouette_iou < median - 0.1);
+    let bad = listed(&|v| v.silhouette_iou < median - 0.2);
     if median >= 0.7 && !bad.is_empty() {
         findings.push(format!("frames [{bad}] disagree with the others: a wrong pose or a bad mask; leave them out"));
     } else if median < 0.7 && found.aabb.is_some() && findings.is_empty() {
@@ -331,10 +331,12 @@ fn axes_are_flipped(found: &CaptureCheck, pairs: &[(&Camera, &Image<u8>)]) -> bo
 
 fn half_pixel_finding(found: &CaptureCheck) -> Option<String> {
     let [left, right] = found.consistency_half_pixel;
-    // Sampling noise of the share is below a hundredth for two dozen frames and more.
-    let gained = left.max(right) - found.silhouette_consistency;
+    // Only near-perfect calibrations can tell: on exact captures a wrong origin costs three hundredths of the
+    // share (analytic_torus, nerf_lego), while errors of real ones cost ten times that whatever the origin.
+    let best = left.max(right);
+    let is_telling = best > 0.93 && best > found.silhouette_consistency + 0.02;
     let side = if left > right { "less" } else { "more" };
-    (gained > 0.05).then(|| {
+    is_telling.then(|| {
         format!("the pixel origin may be off: silhouettes agree better with principal points half a pixel {side}")
     })
 }
