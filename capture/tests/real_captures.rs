@@ -104,7 +104,7 @@ fn iou(a: &capture::View, b: &capture::View) -> f64 {
 fn silhouettes_agree_with_the_scoring_masks() {
     for name in ["templeRing", "dinoRing", "oxford_dinosaur", "squirrel_turntable", "ethz_david"] {
         let Some((mean, _)) = silhouette_iou(name) else { continue };
-        assert!(mean > 0.5, "{name}: {mean}");
+        assert!(mean >= 0.97, "{name}: {mean}");
     }
 }
 

@@ -55,7 +55,7 @@ pub(super) fn facing_the_object(mut frames: Vec<Frame>) -> Vec<Frame> {
     if 2 * behind > frames.len() {
         for camera in frames.iter_mut().map(|f| &mut f.camera) {
             // M diag(1, 1, −1) has the other sign of determinant: −K R diag(1, 1, −1), −K t.
-            camera.rotation = camera.rotation * Matrix3::from_diagonal(&Vector3::new(-1.0, -1.0, 1.0));
+            camera.rotation *= Matrix3::from_diagonal(&Vector3::new(-1.0, -1.0, 1.0));
             camera.translation = -camera.translation;
         }
     }
