@@ -43,8 +43,9 @@ pub fn find_mattes_in_box(images: &[Image<[u8; 3]>], cameras: &[Camera], object_
     let level = learned_level(&scores, cameras, &hull);
     let second: Vec<Image<u8>> = scores.par_iter().map(|score| without_specks(&above(score, level))).collect();
     let hull = vote(cameras, &second, Some(&hull.tight_box)).unwrap_or(hull);
-    let decide =
-        |(score, camera): (&Image<f32>, &Camera)| softened(score, &decided(score, level, camera, &hull), level);
+    let decide = |(score, camera): (&Image<f32>, &Camera)| {
+        softened(score, &decided(score, level, key.fill_level(level), camera, &hull), level)
+    };
     scores.par_iter().zip(cameras).map(decide).collect()
 }
 
@@ -72,6 +73,16 @@ impl Key {
             Self::Hue(chroma.map(|c| c / strength), strength)
         } else {
             Self::Distance(backdrop)
+        }
+    }
+
+    /// The least score of what may be filled in because the hull says so. Before a dark backdrop an unlit part
+    /// looks like it; before any other, what looks like it is an opening (between the legs of the dinosaur).
+    fn fill_level(&self, level: f32) -> f32 {
+        match self {
+            Self::Brightness => 0.0,
+            Self::Hue(..) => 0.5 * (85.0 + level),
+            Self::Distance(_) => 0.5 * level,
         }
     }
 
@@ -237,13 +248,15 @@ fn equal_error_level(object: &[u64; 256], backdrop: &[u64; 256]) -> f32 {
     0.5 * (from + to) as f32
 }
 
-fn decided(score: &Image<f32>, level: f32, camera: &Camera, hull: &Hull) -> Image<u8> {
+fn decided(score: &Image<f32>, level: f32, fill_level: f32, camera: &Camera, hull: &Hull) -> Image<u8> {
     let (likely, cell) = hull.votes.project(&hull.likely, camera);
     let (sure, _) = hull.votes.project(&hull.sure, camera);
     let near = grow(&likely, 1.0 + 0.5 * cell);
     let inner = erode(&sure, 1.0 + 1.5 * cell);
     let object = score.pixels().iter().zip(near.pixels()).zip(inner.pixels());
-    let object = object.map(|((&s, &near), &inner)| if near >= 128 && (s >= level || inner >= 128) { 255 } else { 0 });
+    let object = object.map(
+        |((&s, &near), &inner)| if near >= 128 && (s >= level || (inner >= 128 && s >= fill_level)) { 255 } else { 0 },
+    );
     let mask = Image::from_pixels(score.width(), score.height(), object.collect()).unwrap_or_default();
     without_pinholes(&without_specks(&mask))
 }

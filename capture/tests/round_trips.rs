@@ -1,5 +1,7 @@
 //! Cameras against known answers, and what is written against what is read.
 
+#![allow(clippy::unwrap_used, reason = "tests fail by panicking, helpers included")]
+
 use capture::{Aabb, Camera, Capture, CaptureError, Distortion, Frame, Image, Intrinsics, LoadOptions, MaskSource};
 use nalgebra::{Matrix3, Point2, Point3, Rotation3, Vector2, Vector3};
 use std::path::{Path, PathBuf};
