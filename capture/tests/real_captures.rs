@@ -106,7 +106,8 @@ fn iou(a: &capture::View, b: &capture::View) -> f64 {
 fn silhouettes_agree_with_the_scoring_masks() {
     for name in ["oxford_dinosaur", "templeRing", "dinoRing", "squirrel_turntable", "ethz_david"] {
         let Some((mean, _)) = silhouette_iou(name) else { continue };
-        // The scoring masks of the dinosaur lie half a pixel right and below of its photographs.
+        // The scoring masks of the dinosaur lie a pixel right and below of its photographs: a plain threshold
+        // of view 17 agrees with them to 0.957 in place, to 0.995 moved by (1, 1).
         let least = if name == "oxford_dinosaur" { 0.96 } else { 0.97 };
         assert!(mean >= least, "{name}: {mean}");
     }

@@ -5,7 +5,8 @@
 //! as integers (MATLAB, OpenCV), so they gain one half here, and so do Middlebury's. Measured with
 //! `doctor` (share of silhouette rays that meet all views, gained by +½ over none): temple +0.03, dinosaur
 //! +0.05, Oxford +0.04, squirrel 0.00, David −0.16. It does not decide: calibration errors of these sets
-//! exceed half a pixel, where the exact captures peak at the right origin.
+//! exceed half a pixel, where the exact captures peak at the right origin; and Oxford's masks are moved
+//! against its photographs by more.
 
 use super::{Origin, bad_line, capture, checked_camera, file_name, frame, half_pixel, image_and_size, kind_by_name};
 use super::{list, natural_order, numbers, read_text};
