@@ -92,7 +92,8 @@ struct Source {
 
 impl Source {
     fn new(mesh: &Mesh) -> Result<Self, GeometryError> {
-        let nothing = || GeometryError::degenerate("all vertices are one point", "check that the mesh is the one meant");
+        let nothing =
+            || GeometryError::degenerate("all vertices are one point", "check that the mesh is the one meant");
         let aabb = mesh.aabb().ok_or_else(nothing)?;
         let (center, scale) = (aabb.min.coords / 2.0 + aabb.max.coords / 2.0, aabb.diagonal());
         if !(scale > 0.0 && scale.is_finite()) {
@@ -105,7 +106,8 @@ impl Source {
 
     /// Faces over the input's vertices, and the error in world units.
     fn simplify(&self, options: &SimplifyOptions, locked: &[bool]) -> Result<(Vec<[u32; 3]>, f64), GeometryError> {
-        let refuse = |e: meshopt::Error| GeometryError::degenerate(format!("meshoptimizer: {e}"), "report this as a bug");
+        let refuse =
+            |e: meshopt::Error| GeometryError::degenerate(format!("meshoptimizer: {e}"), "report this as a bug");
         let vertices = VertexDataAdapter::new(&self.bytes, 12, 0).map_err(refuse)?;
         let max_error = options.max_error.map_or(f32::MAX, |e| (e / self.scale) as f32);
         let mut error = 0.0;

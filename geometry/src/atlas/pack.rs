@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use std::ops::Range;
 
 /// Atlas widths tried, over the square root of the cells to pack.
-const WIDTHS: [f64; 6] = [1.0, 1.04, 1.08, 1.12, 1.16, 1.22];
+const WIDTHS: [f64; 12] = [0.98, 1.0, 1.02, 1.04, 1.06, 1.08, 1.1, 1.12, 1.14, 1.17, 1.2, 1.25];
 
 /// Up to this ratio of its sides an atlas counts as square.
 const SQUARE: f64 = 1.15;

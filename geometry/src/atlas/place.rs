@@ -59,7 +59,7 @@ fn place_at(
     let texels = upright.iter().zip(&shapes).zip(&packed.places);
     let texels = texels.map(|((upright, shape), place)| {
         let corner = Vector2::new(place.x as f64, place.y as f64);
-        let turn = |p: &Point2<f64>| (shape.turned(upright.texel(p, density, pad) / cell as f64, place.turns) + corner);
+        let turn = |p: &Point2<f64>| shape.turned(upright.texel(p, density, pad) / cell as f64, place.turns) + corner;
         upright.points.iter().map(|p| turn(p) * cell as f64).map(Point2::from).collect()
     });
     let fill_ratio = area * density * density / (size[0] * size[1]) as f64;
@@ -71,8 +71,14 @@ fn place_at(
 /// of charts align.
 fn cell_size(side: f64, charts: usize, gutter_px: usize) -> usize {
     let chart_side = side / (charts as f64).sqrt();
-    let finest = if side > 2048.0 { 4 } else if side > 700.0 { 2 } else { 1 };
-    let wanted = (chart_side / 40.0).max(1.0) as usize;
+    let finest = if side > 3000.0 {
+        4
+    } else if side > 1500.0 {
+        2
+    } else {
+        1
+    };
+    let wanted = (chart_side / 100.0).max(1.0) as usize;
     wanted.next_power_of_two().min(8).max(finest).min(gutter_px.next_power_of_two().max(4))
 }
 

@@ -1,6 +1,7 @@
 //! Indexed triangle meshes. Triangles are counter-clockwise seen from outside.
 
 pub mod half_edge;
+pub mod io;
 mod smooth;
 
 pub use smooth::{TaubinOptions, taubin_smooth};
