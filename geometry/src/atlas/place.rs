@@ -50,7 +50,7 @@ fn place_at(
     area: f64,
     options: &UnwrapOptions,
 ) -> (Placed, usize) {
-    let cell = cell_size(area.sqrt() * density, charts.len(), options.gutter_px);
+    let cell = cell_size(area.sqrt() * density, charts.len());
     let pad = options.gutter_px.div_ceil(2) as f64;
     let shape = |(chart, upright): (&FlatChart, &Upright)| upright.shape(chart, density, pad, cell);
     let shapes: Vec<Shape> = charts.par_iter().zip(upright).map(shape).collect();
@@ -69,7 +69,7 @@ fn place_at(
 /// Texels per packing cell: small for small charts, which waste half a cell all around, and large for
 /// large atlases, whose search costs the cube of the cells per side. A power of two, so that mip levels
 /// of charts align.
-fn cell_size(side: f64, charts: usize, gutter_px: usize) -> usize {
+fn cell_size(side: f64, charts: usize) -> usize {
     let chart_side = side / (charts as f64).sqrt();
     let finest = if side > 3000.0 {
         4
@@ -79,7 +79,7 @@ fn cell_size(side: f64, charts: usize, gutter_px: usize) -> usize {
         1
     };
     let wanted = (chart_side / 100.0).max(1.0) as usize;
-    wanted.next_power_of_two().min(8).max(finest).min(gutter_px.next_power_of_two().max(4))
+    wanted.next_power_of_two().clamp(finest, 8)
 }
 
 /// A chart turned into its smallest rectangle, whose lower left corner is the origin; y up.
