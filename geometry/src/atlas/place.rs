@@ -34,6 +34,10 @@ pub(super) fn place(charts: &[FlatChart], density: f64, options: &UnwrapOptions)
         if side <= options.max_atlas_px {
             return Ok(placed);
         }
+        // Charts below a texel are all gutter: nothing gets smaller.
+        if side >= smallest && density * longest < 1.0 {
+            break;
+        }
         smallest = smallest.min(side);
         density *= (limit / side as f64).clamp(0.5, 0.97);
     }
@@ -71,15 +75,14 @@ fn place_at(
 /// of charts align.
 fn cell_size(side: f64, charts: usize) -> usize {
     let chart_side = side / (charts as f64).sqrt();
-    let finest = if side > 3000.0 {
-        4
-    } else if side > 1500.0 {
-        2
-    } else {
-        1
+    let finest = match side as usize {
+        0..400 => 1,
+        400..1300 => 2,
+        1300..3000 => 4,
+        _ => 8,
     };
-    let wanted = (chart_side / 100.0).max(1.0) as usize;
-    wanted.next_power_of_two().clamp(finest, 8)
+    // Crowds of small charts take finer cells; their search is cheap, for they fill the first rows.
+    finest.min(((chart_side / 12.0).max(1.0) as usize).next_power_of_two())
 }
 
 /// A chart turned into its smallest rectangle, whose lower left corner is the origin; y up.

@@ -18,8 +18,12 @@ use std::collections::BinaryHeap;
 const ROUNDNESS: f64 = 0.05;
 
 /// Largest `P²/4πA` of a merged chart (a disc has 1, a square 1.3, a strip of 1 : 8 has 3.2), unless one
-/// part was as ragged before: crescents pack badly, and noise alone makes small charts ragged.
+/// part was as ragged before: crescents pack badly.
 const MAX_RAGGEDNESS: f64 = 3.2;
+
+/// Share of the mesh's area below which a chart may be as ragged as it likes: a thin strip is better
+/// unfolded in some pieces than in none.
+const RAGGED_SHARE: f64 = 0.02;
 
 /// Largest angle between the mean normals of two charts that merge, as a cosine (75°). Keeps a small
 /// steep side from vanishing in a large flat chart, which the bend alone would allow.
@@ -60,6 +64,7 @@ struct Growth<'a> {
     owner: Sets,
     max_bend: f64,
     cost_unit: f64,
+    ragged_area: f64,
 }
 
 /// A chart label per face.
@@ -108,6 +113,7 @@ impl<'a> Growth<'a> {
             borders,
             queue: BinaryHeap::new(),
             max_bend,
+            ragged_area: RAGGED_SHARE * total,
             cost_unit: (1_u64 << 46) as f64 / total.max(f64::MIN_POSITIVE),
         }
     }
@@ -135,7 +141,7 @@ impl<'a> Growth<'a> {
         let perimeter = a.perimeter + b.perimeter - 2.0 * length;
         let disc = perimeter * perimeter / (4.0 * std::f64::consts::PI);
         let cost = bend.max(0.0) + ROUNDNESS * disc;
-        let ragged = disc > MAX_RAGGEDNESS.max(a.raggedness()).max(b.raggedness()) * area;
+        let ragged = area > self.ragged_area && disc > MAX_RAGGEDNESS.max(a.raggedness()).max(b.raggedness()) * area;
         (facing && !ragged && bend <= self.max_bend * area && cost.is_finite()).then_some(cost)
     }
 
