@@ -17,9 +17,9 @@ use std::collections::BinaryHeap;
 /// costs as much as a bend of 0.05: roundness decides on flat ground and never against a crease.
 const ROUNDNESS: f64 = 0.05;
 
-/// Largest `P²/4πA` of a merged chart (a disc has 1, a square 1.3, a strip of 1 : 8 has 3.2), unless one
+/// Largest `P²/4πA` of a merged chart (a disc has 1, a square 1.3, a strip of 1 : 6 has 2.6), unless one
 /// part was as ragged before: crescents pack badly.
-const MAX_RAGGEDNESS: f64 = 3.2;
+const MAX_RAGGEDNESS: f64 = 2.6;
 
 /// Share of the mesh's area below which a chart may be as ragged as it likes: a thin strip is better
 /// unfolded in some pieces than in none.

@@ -1,6 +1,7 @@
 //! Meshes that atlas tests and benchmarks unfold.
 
 #![allow(dead_code, reason = "every test binary uses some of it")]
+#![allow(clippy::unwrap_used, reason = "a helper that fails fails its test")]
 
 use geometry::{Mesh, SimplifyOptions, simplify};
 use nalgebra::{Point3, Vector3};
