@@ -6,6 +6,7 @@
 //! This crate knows no GPU and no window.
 
 mod error;
+pub mod metrics;
 mod model;
 
 pub use error::TextureError;
