@@ -1,8 +1,8 @@
 //! A capture: calibrated frames on disk, and the views loaded from them.
 
-use crate::{Camera, CaptureError, Image};
+use crate::{Camera, CaptureError, Image, MaskSource, formats, load, masks, write};
 use nalgebra::{Point3, Vector3};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// An axis-aligned box in world units.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -22,6 +22,8 @@ pub struct Capture {
     pub aabb: Option<Aabb>,
     /// Metres per world unit, where known.
     pub unit: Option<f64>,
+    /// Where the silhouettes come from; the same for all frames.
+    pub mask_source: MaskSource,
 }
 
 /// One calibrated photograph on disk.
@@ -44,6 +46,12 @@ pub struct Frame {
 pub struct LoadOptions {
     /// Whole factor by which images, mattes and cameras are reduced (area average).
     pub downscale: usize,
+}
+
+impl Default for LoadOptions {
+    fn default() -> Self {
+        Self { downscale: 1 }
+    }
 }
 
 /// A photograph in memory, with all that later stages need to know of it.
@@ -89,11 +97,59 @@ impl Aabb {
 }
 
 impl Capture {
-    /// Loads the frames at the given positions.
+    /// Reads a calibrated folder of any known kind, or the calibration file in it: `transforms.json`,
+    /// COLMAP text or binary, Middlebury `*_par.txt`, projection matrices as text or MATLAB file.
+    /// Finds the masks under every spelling in use. Images are not decoded, and need not exist as long
+    /// as the calibration says their size.
+    ///
+    /// # Errors
+    /// Names the file, what is wrong with it and what to do; a folder that is no capture lists what was
+    /// looked for.
+    pub fn read(path: &Path) -> Result<Self, CaptureError> {
+        let mut capture = formats::read(path)?;
+        capture.mask_source = masks::find(&mut capture.frames)?;
+        Ok(capture)
+    }
+
+    /// Writes `transforms.json` (nerfstudio convention), `images/` and `masks/` to the folder `dir`,
+    /// which appears whole or not at all. An earlier capture of that name is replaced.
+    ///
+    /// # Errors
+    /// When a source file is missing, the disk is full, or `dir` holds something that is no capture.
+    pub fn write(&self, dir: &Path) -> Result<(), CaptureError> {
+        write::write(self, None, dir)
+    }
+
+    /// As [`Capture::write`], with `mattes` (one per frame, of its size) in place of the given masks.
+    ///
+    /// # Errors
+    /// As [`Capture::write`], and when the number of mattes is not that of the frames.
+    pub fn write_with_mattes(&self, mattes: &[Image<u8>], dir: &Path) -> Result<(), CaptureError> {
+        write::write(self, Some(mattes), dir)
+    }
+
+    /// The same capture with its masks and alpha channels ignored: silhouettes will be found in the
+    /// photographs.
+    pub fn without_masks(mut self) -> Self {
+        self.frames.iter_mut().for_each(|frame| frame.mask_path = None);
+        self.mask_source = MaskSource::Automatic;
+        self
+    }
+
+    /// Loads the frames at the given positions, in the given order.
     ///
     /// # Errors
     /// Names the file that is missing, truncated, of another size than its camera, or empty.
-    pub fn load_views(&self, _positions: &[usize], _options: &LoadOptions) -> Result<Vec<View>, CaptureError> {
-        unreachable!("written by the capture stage")
+    pub fn load_views(&self, positions: &[usize], options: &LoadOptions) -> Result<Vec<View>, CaptureError> {
+        load::load_views(self, positions, options)
+    }
+
+    /// Loads every frame, in file order.
+    ///
+    /// # Errors
+    /// As [`Capture::load_views`].
+    pub fn load_all_views(&self, options: &LoadOptions) -> Result<Vec<View>, CaptureError> {
+        let all: Vec<usize> = (0..self.frames.len()).collect();
+        self.load_views(&all, options)
     }
 }

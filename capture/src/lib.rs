@@ -3,13 +3,31 @@
 //! A [`Capture`] is a list of calibrated frames on disk; [`Capture::load_views`] brings the pixels of
 //! some of them into memory as [`View`]s. Everything a later stage needs to know of a photograph is in
 //! its `View`: image, matte, camera. This crate knows no mesh, no atlas, no GPU and no command line.
+//!
+//! ```no_run
+//! use capture::{Capture, LoadOptions};
+//!
+//! let capture = Capture::read("owl".as_ref())?;
+//! println!("{} frames, {}", capture.frames.len(), capture.mask_source);
+//! let views = capture.load_all_views(&LoadOptions { downscale: 2 })?;
+//! # Ok::<(), capture::CaptureError>(())
+//! ```
 
 mod camera;
 mod capture_set;
 mod error;
+mod formats;
 mod image;
+mod load;
+mod masks;
+mod pixels;
+pub mod silhouette;
+mod write;
 
 pub use camera::{Camera, Distortion, Intrinsics, Projected, Ray};
 pub use capture_set::{Aabb, Capture, Frame, LoadOptions, View};
 pub use error::CaptureError;
+pub use formats::{CaptureFormat, detect_format};
 pub use image::Image;
+pub use masks::MaskSource;
+pub use pixels::{read_matte, read_rgb, write_matte, write_rgb};
