@@ -1,0 +1,113 @@
+//! The fast renderer: tiles, edge functions, deferred shading; the picture [`crate::reference`] defines.
+//!
+//! Four stages, each parallel and each with the same result whatever the thread count:
+//!
+//! 1. *setup*: every face becomes three edge functions over the pixels of an ideal pinhole, by
+//!    homogeneous rasterisation (Olano and Greer, Triangle Scan Conversion using 2D Homogeneous
+//!    Coordinates, 1997). They hold for faces that cross the camera plane too, so nothing is clipped;
+//! 2. *visibility*: tile by tile, the nearest face of each sub-sample, then its texture coordinates
+//!    and mip level;
+//! 3. *mips*: only as many levels as some visible sub-sample asks for;
+//! 4. *shading*: one trilinear lookup per visible sub-sample.
+//!
+//! Edge functions are evaluated in `f64` and are exactly opposite on both sides of a shared edge, so
+//! a sub-sample on the edge belongs to one of the two faces, never to both or none.
+//!
+//! A lens is exact: sub-samples are carried to the ideal plane once per camera model (microseconds
+//! each, so a second for the first frame; a [`Player`] keeps them) and faces are tested there.
+
+mod samples;
+mod setup;
+mod shade;
+mod visibility;
+
+use crate::filter::MipChain;
+use crate::{RenderOptions, frame_size, is_usable, resolve};
+use capture::{Camera, Image};
+use geometry::TexturedMesh;
+use rayon::prelude::*;
+use samples::Samples;
+use std::time::{Duration, Instant};
+
+/// How long the stages of the last frame took.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct StageTimes {
+    /// Edge functions and bins, and the lens where it changed.
+    pub setup: Duration,
+    /// Nearest faces, texture coordinates, mip levels.
+    pub visibility: Duration,
+    /// Reductions of the atlas.
+    pub mips: Duration,
+    /// Texture lookups, averages, the picture.
+    pub shading: Duration,
+}
+
+/// Plays one mesh: keeps between frames what does not depend on the pose.
+#[derive(Debug)]
+pub struct Player<'a> {
+    mesh: &'a TexturedMesh,
+    options: RenderOptions,
+    samples: Option<Samples>,
+    times: StageTimes,
+}
+
+/// Draws one frame; the same contract as [`crate::reference::render`].
+pub fn render(
+    mesh: &TexturedMesh,
+    atlas: &Image<[f32; 3]>,
+    camera: &Camera,
+    options: &RenderOptions,
+) -> Image<[u8; 4]> {
+    Player::new(mesh, *options).render(atlas, camera)
+}
+
+impl<'a> Player<'a> {
+    /// A player of `mesh`.
+    pub fn new(mesh: &'a TexturedMesh, options: RenderOptions) -> Self {
+        Self { mesh, options, samples: None, times: StageTimes::default() }
+    }
+
+    /// How long the stages of the last frame took.
+    pub fn times(&self) -> StageTimes {
+        self.times
+    }
+
+    /// Draws one frame with `atlas` (encoded 0..=255, unclamped): RGBA, 8 bit encoded, not
+    /// premultiplied, alpha the share of covered sub-samples. See [`crate::reference::render`].
+    pub fn render(&mut self, atlas: &Image<[f32; 3]>, camera: &Camera) -> Image<[u8; 4]> {
+        self.times = StageTimes::default();
+        let (width, height) = frame_size(camera);
+        let nothing = resolve::Accumulator::default().finish(1, self.options.background);
+        let mut frame = Image::filled(width, height, nothing);
+        if width == 0 || height == 0 || !is_usable(camera) {
+            return frame;
+        }
+        let start = Instant::now();
+        let n = self.options.per_side();
+        let samples = match self.samples.take() {
+            Some(kept) if kept.fit(&camera.intrinsics, n) => kept,
+            _ => Samples::new(camera, n),
+        };
+        let samples = self.samples.insert(samples);
+        let faces = setup::faces(self.mesh, camera);
+        let bins = samples.bin(&faces);
+        let binned = Instant::now();
+        let size = [atlas.width(), atlas.height()];
+        let tiles: Vec<_> = (0..samples.tiles())
+            .into_par_iter()
+            .map(|tile| visibility::tile(samples, tile, bins.of(tile), &faces, self.mesh, size))
+            .collect();
+        let seen = Instant::now();
+        let top = tiles.iter().map(visibility::Fragments::top_level).max().unwrap_or(0);
+        let chain = MipChain::build(atlas, top);
+        let reduced = Instant::now();
+        shade::frame(&mut frame, samples, &tiles, &chain, self.options.background);
+        self.times = StageTimes {
+            setup: binned - start,
+            visibility: seen - binned,
+            mips: reduced - seen,
+            shading: reduced.elapsed(),
+        };
+        frame
+    }
+}

@@ -1,0 +1,178 @@
+//! The texture filter both renderers share: mip chain by 2 × 2 boxes, bilinear, trilinear.
+//!
+//! Everything is linear in the texels and nothing clamps, so filtering commutes with the blend of
+//! layers that made the atlas: mip-then-blend equals blend-then-mip.
+//!
+//! Texel (i, j) of level `l` covers `[i 2^l, (i+1) 2^l)` of level 0, for any size: an odd size is
+//! rounded up and its last texel repeated. Lookups beyond the border repeat the border. The gutters
+//! of the atlas are expected to be filled (push–pull), so that every level is usable.
+
+use capture::Image;
+use rayon::prelude::*;
+
+/// Mip levels below this count as level 0. A 1:1 view then reads level 0 alone despite rounding;
+/// graphics hardware quantises levels to the same 1/256.
+const MIN_LEVEL: f32 = 1.0 / 256.0;
+
+/// An atlas and as many reductions of it as were asked for.
+#[derive(Clone, Debug)]
+pub struct MipChain<'a> {
+    base: &'a Image<[f32; 3]>,
+    reduced: Vec<Image<[f32; 3]>>,
+}
+
+impl<'a> MipChain<'a> {
+    /// The atlas with levels 1 ..= `top`, or up to the level of one texel where that is lower.
+    pub fn build(base: &'a Image<[f32; 3]>, top: usize) -> Self {
+        let top = top.min(top_level(base.width(), base.height()));
+        let mut reduced: Vec<Image<[f32; 3]>> = Vec::with_capacity(top);
+        for _ in 0..top {
+            let next = halved(reduced.last().unwrap_or(base));
+            reduced.push(next);
+        }
+        Self { base, reduced }
+    }
+
+    /// The texels of `level`, 0 being the atlas; the coarsest built where `level` lies beyond.
+    pub fn level(&self, level: usize) -> &Image<[f32; 3]> {
+        match level.min(self.reduced.len()) {
+            0 => self.base,
+            l => &self.reduced[l - 1],
+        }
+    }
+
+    /// The texture at (`x`, `y`) in texels of level 0, outer corner of the first texel (0, 0),
+    /// filtered trilinearly for a fractional `level`. Zero of an empty atlas.
+    pub fn sample(&self, x: f32, y: f32, level: f32) -> [f32; 3] {
+        let level = level.min(self.reduced.len() as f32);
+        // Also the way out for NaN.
+        if level.is_nan() || level < MIN_LEVEL {
+            return bilinear(self.base, x, y);
+        }
+        let fine = level as usize;
+        let fraction = level - fine as f32;
+        let scale = 1.0 / (1_u64 << fine) as f32;
+        let a = bilinear(self.level(fine), x * scale, y * scale);
+        if fraction == 0.0 {
+            return a;
+        }
+        let b = bilinear(self.level(fine + 1), x * scale * 0.5, y * scale * 0.5);
+        [0, 1, 2].map(|c| a[c] + fraction * (b[c] - a[c]))
+    }
+}
+
+/// The level of one single texel.
+pub fn top_level(width: usize, height: usize) -> usize {
+    let longest = width.max(height).max(1);
+    longest.next_power_of_two().trailing_zeros() as usize
+}
+
+/// The mip level for a footprint whose longer side is the root of `footprint_squared`, in texels;
+/// 0 under magnification. As OpenGL defines it (4.6 core, eq. 8.7), for the distance between
+/// sub-samples.
+pub fn level_of_footprint(footprint_squared: f32) -> f32 {
+    if footprint_squared > 1.0 { 0.5 * footprint_squared.log2() } else { 0.0 }
+}
+
+/// Half the size, each texel the mean of 2 × 2.
+fn halved(fine: &Image<[f32; 3]>) -> Image<[f32; 3]> {
+    let (width, height) = (fine.width().div_ceil(2), fine.height().div_ceil(2));
+    let mut coarse = Image::filled(width, height, [0.0; 3]);
+    // An image without texels has no chunks.
+    let width = width.max(1);
+    coarse.pixels_mut().par_chunks_mut(width).with_min_len(16).enumerate().for_each(|(y, row)| {
+        let above = fine.row(2 * y);
+        let below = fine.row((2 * y + 1).min(fine.height() - 1));
+        for ((texel, a), b) in row.iter_mut().zip(above.chunks(2)).zip(below.chunks(2)) {
+            let ([a0, .., a1] | [a0 @ a1]) = a else { continue };
+            let ([b0, .., b1] | [b0 @ b1]) = b else { continue };
+            *texel = [0, 1, 2].map(|c| 0.25 * (a0[c] + a1[c] + b0[c] + b1[c]));
+        }
+    });
+    coarse
+}
+
+/// One level at (`x`, `y`) in its own texels, borders repeated.
+fn bilinear(image: &Image<[f32; 3]>, x: f32, y: f32) -> [f32; 3] {
+    if image.pixels().is_empty() {
+        return [0.0; 3];
+    }
+    let (x0, x1, s) = neighbours(x, image.width());
+    let (y0, y1, t) = neighbours(y, image.height());
+    let (above, below) = (image.row(y0), image.row(y1));
+    let (a, b, c, d) = (above[x0], above[x1], below[x0], below[x1]);
+    [0, 1, 2].map(|k| {
+        let top = a[k] + s * (b[k] - a[k]);
+        let bottom = c[k] + s * (d[k] - c[k]);
+        top + t * (bottom - top)
+    })
+}
+
+/// The two texels either side of `x` and how far it is from the first to the second.
+fn neighbours(x: f32, size: usize) -> (usize, usize, f32) {
+    let last = size - 1;
+    let x = (x - 0.5).clamp(0.0, last as f32);
+    let first = (x as usize).min(last);
+    (first, (first + 1).min(last), x - first as f32)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn pattern(width: usize, height: usize, seed: f32) -> Image<[f32; 3]> {
+        let mut image = Image::filled(width, height, [0.0; 3]);
+        for (i, p) in image.pixels_mut().iter_mut().enumerate() {
+            *p = [0.0, 1.0, 2.0].map(|c| 127.0 * (1.0 + (i as f32 * 0.37 + seed + c).sin()));
+        }
+        image
+    }
+
+    #[test]
+    fn texel_centres_are_kept() {
+        let image = pattern(7, 5, 0.0);
+        let chain = MipChain::build(&image, 3);
+        for y in 0..5 {
+            for x in 0..7 {
+                assert_eq!(chain.sample(x as f32 + 0.5, y as f32 + 0.5, 0.0), image.at(x, y));
+            }
+        }
+    }
+
+    #[test]
+    fn mip_then_blend_is_blend_then_mip() {
+        let (a, b) = (pattern(37, 22, 0.0), pattern(37, 22, 5.0));
+        let mut blend = a.clone();
+        for (p, (a, b)) in blend.pixels_mut().iter_mut().zip(a.pixels().iter().zip(b.pixels())) {
+            // Weights of both signs: bases are not convex.
+            *p = [0, 1, 2].map(|c| 1.3 * a[c] - 0.4 * b[c]);
+        }
+        let [a, b, blend] = [&a, &b, &blend].map(|image| MipChain::build(image, usize::MAX));
+        for i in 0..400 {
+            let (x, y, level) = (i as f32 * 0.093, i as f32 * 0.055, i as f32 * 0.02);
+            let (p, q, r) = (a.sample(x, y, level), b.sample(x, y, level), blend.sample(x, y, level));
+            for c in 0..3 {
+                let apart = (1.3 * p[c] - 0.4 * q[c] - r[c]).abs();
+                assert!(apart < 1e-4, "{apart} at level {level}");
+            }
+        }
+    }
+
+    #[test]
+    fn constant_stays_constant_on_every_level() {
+        let image = Image::filled(5, 9, [7.0, 8.0, 9.0]);
+        let chain = MipChain::build(&image, usize::MAX);
+        assert_eq!(chain.level(99).pixels().len(), 1);
+        for level in [0.0, 0.7, 2.5, 99.0, f32::INFINITY, f32::NAN] {
+            assert_eq!(chain.sample(3.3, -2.0, level), [7.0, 8.0, 9.0]);
+        }
+    }
+
+    #[test]
+    fn nothing_panics_without_texels() {
+        let empty = Image::filled(0, 0, [0.0; 3]);
+        assert_eq!(MipChain::build(&empty, 4).sample(0.0, f32::NAN, 3.0), [0.0; 3]);
+        let chain = Image::filled(1, 1, [1.0; 3]);
+        assert_eq!(MipChain::build(&chain, 4).sample(f32::NAN, f32::INFINITY, 3.0).len(), 3);
+    }
+}

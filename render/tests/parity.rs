@@ -1,0 +1,189 @@
+//! The fast renderer draws what the reference defines.
+
+mod support;
+
+use capture::{Camera, Distortion, Image};
+use geometry::TexturedMesh;
+use nalgebra::Point3;
+use render::{RenderOptions, cpu, reference};
+use support::{atlas, knot, look_at, sphere, surface, torus};
+
+/// What two pictures of the same thing may differ by.
+#[derive(Debug, Default)]
+struct Difference {
+    /// Pixels wholly covered in both.
+    inner: usize,
+    /// Of these, further apart than one level.
+    inner_off: usize,
+    /// Pixels partly covered in either.
+    edge: usize,
+    /// Of these, further apart than one level, coverage included.
+    edge_off: usize,
+}
+
+fn difference(a: &Image<[u8; 4]>, b: &Image<[u8; 4]>) -> Difference {
+    assert_eq!((a.width(), a.height()), (b.width(), b.height()));
+    let mut out = Difference::default();
+    for (p, q) in a.pixels().iter().zip(b.pixels()).filter(|(p, q)| p[3] > 0 || q[3] > 0) {
+        let off = usize::from((0..4).any(|c| p[c].abs_diff(q[c]) > 1));
+        if p[3] == 255 && q[3] == 255 {
+            out.inner += 1;
+            out.inner_off += off;
+        } else {
+            out.edge += 1;
+            out.edge_off += off;
+        }
+    }
+    out
+}
+
+/// Parity as we promise it: 99.9 % of inner pixels to rounding; of edge pixels as much, for both
+/// renderers test the same points and only ties may fall differently.
+fn assert_parity(what: &str, mesh: &TexturedMesh, atlas: &Image<[f32; 3]>, camera: &Camera, options: &RenderOptions) {
+    let expected = reference::render(mesh, atlas, camera, options);
+    let actual = cpu::render(mesh, atlas, camera, options);
+    let d = difference(&expected, &actual);
+    println!("{what}: {d:?}");
+    assert!(d.inner + d.edge > 100, "{what}: nothing to compare: {d:?}");
+    assert!(d.inner_off * 1000 <= d.inner, "{what}: {d:?}");
+    assert!(d.edge_off * 100 <= d.edge, "{what}: {d:?}");
+}
+
+fn at(supersample: usize) -> RenderOptions {
+    RenderOptions { supersample, background: None }
+}
+
+#[test]
+fn solids_from_several_eyes() {
+    let atlas = atlas(512, 384);
+    for (name, mesh) in [("sphere", sphere(40, 20)), ("torus", torus(60, 24)), ("knot", knot(160, 12))] {
+        for (eye, n) in [([3.0, 0.4, 1.0], 2), ([0.3, -2.0, 2.0], 1), ([-1.2, 1.1, 0.1], 3)] {
+            let camera = look_at(Point3::from(eye), Point3::origin(), 180.0, 201, 151);
+            assert_parity(name, &mesh, &atlas, &camera, &at(n));
+        }
+    }
+}
+
+#[test]
+fn far_and_near() {
+    let (mesh, atlas) = (knot(200, 16), atlas(1024, 1024));
+    let far = look_at(Point3::new(40.0, 5.0, 9.0), Point3::origin(), 700.0, 96, 96);
+    assert_parity("minified", &mesh, &atlas, &far, &at(2));
+    let near = look_at(Point3::new(1.3, 0.2, 0.1), Point3::origin(), 400.0, 96, 96);
+    assert_parity("magnified", &mesh, &atlas, &near, &at(2));
+}
+
+#[test]
+fn background_is_opaque() {
+    let (mesh, atlas) = (torus(30, 12), atlas(64, 64));
+    let camera = look_at(Point3::new(2.5, 1.0, 1.5), Point3::origin(), 120.0, 80, 60);
+    let options = RenderOptions { supersample: 2, background: Some([10, 200, 30]) };
+    assert_parity("background", &mesh, &atlas, &camera, &options);
+    let frame = cpu::render(&mesh, &atlas, &camera, &options);
+    assert_eq!(frame.at(0, 0), [10, 200, 30, 255]);
+    assert!(frame.pixels().iter().all(|p| p[3] == 255));
+}
+
+#[test]
+fn skew_and_lens_are_exact() {
+    let (mesh, atlas) = (sphere(40, 20), atlas(256, 256));
+    let mut camera = look_at(Point3::new(2.6, 0.6, 0.4), Point3::origin(), 150.0, 160, 120);
+    camera.intrinsics.skew = 12.0;
+    camera.intrinsics.fy = 140.0;
+    assert_parity("skew", &mesh, &atlas, &camera, &at(2));
+    camera.intrinsics.distortion = Distortion { k1: -0.25, k2: 0.08, k3: 0.0, p1: 0.001, p2: -0.0005 };
+    assert_parity("barrel", &mesh, &atlas, &camera, &at(2));
+    camera.intrinsics.distortion = Distortion { k1: 0.2, ..Distortion::default() };
+    assert_parity("pincushion", &mesh, &atlas, &camera, &at(1));
+}
+
+#[test]
+fn eye_inside_the_mesh() {
+    let atlas = atlas(256, 256);
+    for eye in [[0.0, 0.0, 0.0], [0.9, 0.1, 0.2], [0.3, 0.3, -0.8]] {
+        let camera = look_at(Point3::from(eye), Point3::new(0.2, -1.0, 0.3), 60.0, 120, 90);
+        assert_parity("inside sphere", &sphere(24, 12), &atlas, &camera, &at(2));
+    }
+    // A floor from under one's feet to the horizon crosses the camera plane.
+    let floor = surface(3, 3, false, |s, t| Point3::new(40.0 * (s - 0.5), 40.0 * (t - 0.5), 0.0));
+    let camera = look_at(Point3::new(0.1, 0.2, 0.7), Point3::new(5.0, 3.0, 0.5), 60.0, 120, 90);
+    assert_parity("floor", &floor, &atlas, &camera, &at(2));
+}
+
+/// A quad that fills the frame with one texel per pixel: pixel centres meet texel centres.
+#[test]
+fn one_to_one_is_the_identity() {
+    let (width, height) = (61, 47);
+    let quad = surface(1, 1, false, |s, t| Point3::new(s * width as f64, t * height as f64, 50.0));
+    let mut camera = look_at(Point3::origin(), Point3::new(0.0, 0.0, 1.0), 50.0, width, height);
+    camera.rotation = nalgebra::Matrix3::identity();
+    (camera.intrinsics.cx, camera.intrinsics.cy) = (0.0, 0.0);
+    let mut atlas = atlas(width, height);
+    atlas.pixels_mut().iter_mut().for_each(|p| *p = p.map(|c| c.clamp(0.0, 255.0).round()));
+    for frame in [reference::render(&quad, &atlas, &camera, &at(1)), cpu::render(&quad, &atlas, &camera, &at(1))] {
+        for (p, t) in frame.pixels().iter().zip(atlas.pixels()) {
+            assert_eq!(*p, [t[0] as u8, t[1] as u8, t[2] as u8, 255]);
+        }
+    }
+}
+
+/// Shared edges through sub-sample positions: each point belongs to exactly one face, so a plate
+/// of any triangulation has no holes.
+#[test]
+fn grid_aligned_edges_leave_no_holes() {
+    let plate = surface(32, 32, true, |s, t| Point3::new(64.0 * s + 0.25, 64.0 * t + 0.25, 50.0));
+    let mut camera = look_at(Point3::origin(), Point3::new(0.0, 0.0, 1.0), 50.0, 65, 65);
+    camera.rotation = nalgebra::Matrix3::identity();
+    (camera.intrinsics.cx, camera.intrinsics.cy) = (0.0, 0.0);
+    let frame = cpu::render(&plate, &atlas(64, 64), &camera, &at(2));
+    for y in 1..64 {
+        for x in 1..64 {
+            assert_eq!(frame.at(x, y)[3], 255, "hole at {x}, {y}");
+        }
+    }
+}
+
+#[test]
+fn thread_count_changes_nothing() {
+    let (mesh, atlas) = (knot(120, 12), atlas(256, 256));
+    let camera = look_at(Point3::new(2.0, 1.0, 1.5), Point3::origin(), 200.0, 200, 150);
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+    let alone = pool.install(|| cpu::render(&mesh, &atlas, &camera, &at(2)));
+    assert_eq!(alone, cpu::render(&mesh, &atlas, &camera, &at(2)));
+}
+
+#[test]
+fn broken_input_does_not_panic() {
+    let atlas = atlas(16, 16);
+    let good = sphere(6, 4);
+    let camera = look_at(Point3::new(3.0, 0.0, 0.0), Point3::origin(), 20.0, 24, 16);
+    let mut meshes = vec![good.clone(); 6];
+    meshes[0].mesh.faces.clear();
+    meshes[1].mesh.faces[3] = [0, 1, 9999];
+    meshes[2].uvs.truncate(5);
+    meshes[3].mesh.positions.iter_mut().step_by(3).for_each(|p| p.x = f64::NAN);
+    meshes[4].mesh.positions.fill(Point3::origin());
+    meshes[5].uvs.iter_mut().for_each(|uv| uv.x = f64::INFINITY);
+    meshes.push(good.clone());
+    meshes[6].mesh.positions.iter_mut().for_each(|p| p.y *= 1e300);
+    meshes.push(good);
+    meshes[7].mesh.positions.iter_mut().for_each(|p| *p *= 1e-200);
+
+    let mut cameras = vec![camera; 9];
+    cameras[1].intrinsics.fx = 0.0;
+    cameras[2].translation.x = f64::NAN;
+    (cameras[3].intrinsics.width, cameras[3].intrinsics.height) = (0, 7);
+    (cameras[4].intrinsics.width, cameras[4].intrinsics.height) = (usize::MAX, 2);
+    cameras[5].rotation.fill(0.0);
+    cameras[6].intrinsics.distortion.k1 = -50.0;
+    cameras[7].intrinsics.fx = 1e-300;
+    cameras[8].translation.z = 1e55;
+    for (mesh, camera) in meshes.iter().flat_map(|m| cameras.iter().map(move |c| (m, c))) {
+        for supersample in [0, 1, 40] {
+            for atlas in [&atlas, &Image::filled(0, 0, [0.0; 3])] {
+                cpu::render(mesh, atlas, camera, &at(supersample));
+            }
+        }
+        reference::render(mesh, &atlas, camera, &at(1));
+    }
+}
