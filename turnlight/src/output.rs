@@ -55,14 +55,23 @@ impl OutputFolder {
         self.folder.path()
     }
 
-    /// Writes a file below the folder, making the folders above it.
+    /// Where a file below the folder is to be written; makes the folders above it.
+    ///
+    /// # Errors
+    /// Names the file and what the system said.
+    pub fn place(&self, relative: impl AsRef<Path>) -> Result<PathBuf, Error> {
+        let path = self.folder.path().join(relative.as_ref());
+        fs::create_dir_all(parent(&path)).map_err(|source| cannot_write(&self.target.join(relative), source))?;
+        Ok(path)
+    }
+
+    /// Writes a file below the folder.
     ///
     /// # Errors
     /// Names the file and what the system said.
     pub fn write(&self, relative: impl AsRef<Path>, bytes: &[u8]) -> Result<(), Error> {
-        let path = self.folder.path().join(relative.as_ref());
+        let path = self.place(relative.as_ref())?;
         let write = || -> std::io::Result<()> {
-            fs::create_dir_all(parent(&path))?;
             let mut file = fs::File::create(&path)?;
             file.write_all(bytes)?;
             file.sync_data()

@@ -1,6 +1,6 @@
 //! Pictures for the report: the object cut out of the frame, and where a render differs.
 
-use crate::{Error, pixels};
+use crate::Error;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use capture::Image;
@@ -56,7 +56,7 @@ impl Cut {
 
     /// The cut-out as a `data:` URI.
     pub(super) fn data_uri(&self, image: &Image<[u8; 3]>) -> Result<String, Error> {
-        Ok(format!("data:image/png;base64,{}", STANDARD.encode(pixels::png_rgb(&self.apply(image))?)))
+        Ok(format!("data:image/png;base64,{}", STANDARD.encode(png(&self.apply(image))?)))
     }
 }
 
@@ -67,11 +67,6 @@ pub(super) fn masked(photograph: &Image<[u8; 3]>, mask: &Image<u8>) -> Image<[u8
     out
 }
 
-/// A render on black.
-pub(super) fn on_black(render: &Image<[u8; 4]>) -> Image<[u8; 3]> {
-    render.map(|[r, g, b, a]| [r, g, b].map(|v| ((u32::from(v) * u32::from(a) + 127) / 255) as u8))
-}
-
 /// Absolute differences, exaggerated; black is agreement.
 pub(super) fn difference(a: &Image<[u8; 3]>, b: &Image<[u8; 3]>) -> Image<[u8; 3]> {
     let mut out = a.clone();
@@ -79,6 +74,20 @@ pub(super) fn difference(a: &Image<[u8; 3]>, b: &Image<[u8; 3]>) -> Image<[u8; 3
         *p = [0, 1, 2].map(|c| p[c].abs_diff(q[c]).saturating_mul(DIFFERENCE_GAIN));
     }
     out
+}
+
+fn png(image: &Image<[u8; 3]>) -> Result<Vec<u8>, Error> {
+    let encode = || -> Result<Vec<u8>, Box<dyn std::error::Error>> {
+        let mut bytes = Vec::new();
+        let mut encoder =
+            png::Encoder::new(&mut bytes, u32::try_from(image.width())?, u32::try_from(image.height())?);
+        encoder.set_color(png::ColorType::Rgb);
+        let mut writer = encoder.write_header()?;
+        writer.write_image_data(image.pixels().as_flattened())?;
+        writer.finish()?;
+        Ok(bytes)
+    };
+    encode().map_err(|fault| Error::Failed(format!("a picture of the report cannot be encoded: {fault}")))
 }
 
 #[cfg(test)]

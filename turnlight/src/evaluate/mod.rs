@@ -19,7 +19,7 @@ pub use table::{csv, text};
 use crate::output::OutputFolder;
 use crate::pipeline::{self, ShapeOptions};
 use crate::stages::{Observer, Stages};
-use crate::{Error, pixels, playback};
+use crate::{Error, playback};
 use capture::{Capture, Image, LoadOptions, View};
 use figures::round6;
 use geometry::TexturedMesh;
@@ -139,8 +139,8 @@ fn without_leaks(
 
 fn write_references(views: &[View], report: &OutputFolder) -> Result<(), Error> {
     views.par_iter().try_for_each(|view| {
-        report.write(view_path("reference", view.index), &pixels::png_rgb(&view.image)?)?;
-        report.write(view_path("mask", view.index), &pixels::png_grey(&view.matte)?)
+        capture::write_rgb(&report.place(view_path("reference", view.index))?, &view.image)?;
+        Ok(capture::write_matte(&report.place(view_path("mask", view.index))?, &view.matte)?)
     })
 }
 
@@ -203,7 +203,7 @@ fn score_view(
     report: Option<&OutputFolder>,
 ) -> Result<ViewFigures, Error> {
     if let Some(report) = report {
-        report.write(view_path(method, view.index), &pixels::png_rgba(frame)?)?;
+        render::film::write_png(&report.place(view_path(method, view.index))?, frame)?;
     }
     Ok(ViewFigures::new(view.index, &metrics::score(frame, &view.image, &view.matte)?))
 }

@@ -3,7 +3,7 @@
 use super::crops::{self, Cut, DIFFERENCE_GAIN};
 use super::{Comparison, plot, table, view_path};
 use crate::output::OutputFolder;
-use crate::{Error, pixels};
+use crate::Error;
 use std::fmt::Write;
 
 const STYLE: &str = "body{font:15px/1.5 system-ui,sans-serif;margin:2em auto;max-width:1500px;padding:0 1em}\
@@ -76,14 +76,14 @@ fn push_crops(
     report: &OutputFolder,
 ) -> Result<(), Error> {
     let file = |kind: &str| report.path().join(view_path(kind, position));
-    let mask = pixels::read_png_grey(&file("mask"))?;
-    let reference = crops::masked(&pixels::read_png_rgb(&file("reference"))?, &mask);
+    let mask = capture::read_matte(&file("mask"))?;
+    let reference = crops::masked(&capture::read_rgb(&file("reference"))?, &mask);
     let cut = Cut::around(&mask);
     page.push_str(&format!("<h3>View {position}</h3>\n<div>"));
     push_picture(page, &cut.data_uri(&reference)?, "reference");
     let mut differences = Vec::new();
     for method in &comparison.methods {
-        let render = crops::on_black(&pixels::read_png_rgba(&file(method.method))?);
+        let render = capture::read_rgb(&file(method.method))?;
         push_picture(page, &cut.data_uri(&render)?, method.method);
         differences.push((method.method, cut.data_uri(&crops::difference(&render, &reference))?));
     }
