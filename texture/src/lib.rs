@@ -5,9 +5,24 @@
 //! texture of the whole object as seen from one eye; a renderer then draws a mesh with one texture.
 //! This crate knows no GPU and no window.
 
+pub mod appearance;
+mod bake;
+mod coding;
+mod complete;
+pub mod directions;
 mod error;
+mod facets;
+mod glb;
+mod layers;
 pub mod metrics;
 mod model;
+mod observe;
+mod surface;
 
+pub use bake::Bake;
 pub use error::TextureError;
-pub use model::{FitOptions, FitReport, Method, Model, fit};
+pub use facets::Facets;
+pub use glb::EXTENSION;
+pub use layers::{FacetWeights, Layer, Layers};
+pub use model::{Appearance, FitOptions, FitReport, Method, Model, ModelBytes, fit};
+pub use surface::SurfaceTexels;

@@ -1,0 +1,39 @@
+//! The surface behind every texel of the atlas.
+
+use geometry::TexturedMesh;
+use geometry::atlas::AtlasTexels;
+use nalgebra::{Point3, Vector3};
+
+/// One entry per texel that carries surface, in row-major order of the atlas.
+#[derive(Clone, Debug)]
+pub struct SurfaceTexels {
+    /// Width and height of the atlas.
+    pub size: [usize; 2],
+    /// `y · width + x` of each texel, ascending.
+    pub index: Vec<u32>,
+    /// The face behind each texel.
+    pub faces: Vec<u32>,
+    /// The surface point at each texel's centre, in the world.
+    pub positions: Vec<Point3<f64>>,
+    /// Smooth unit normal there.
+    pub normals: Vec<Vector3<f64>>,
+}
+
+impl SurfaceTexels {
+    /// Bakes the surface of `mesh` into its atlas.
+    pub fn bake(mesh: &TexturedMesh) -> Self {
+        let _ = AtlasTexels::rasterize;
+        let _ = mesh;
+        unimplemented!()
+    }
+
+    /// Texels that carry surface.
+    pub fn len(&self) -> usize {
+        self.index.len()
+    }
+
+    /// Whether no texel carries surface.
+    pub fn is_empty(&self) -> bool {
+        self.index.is_empty()
+    }
+}
