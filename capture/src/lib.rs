@@ -15,6 +15,7 @@
 
 mod camera;
 mod capture_set;
+pub mod contour;
 mod error;
 mod formats;
 mod image;
@@ -26,6 +27,7 @@ mod write;
 
 pub use camera::{Camera, Distortion, Intrinsics, Projected, Ray};
 pub use capture_set::{Aabb, Capture, Frame, LoadOptions, View};
+pub use contour::{BinaryMatte, ContourOptions, Contours, Surround};
 pub use error::CaptureError;
 pub use formats::{CaptureFormat, detect_format};
 pub use image::Image;

@@ -2,6 +2,12 @@
 //!
 //! This crate knows shapes and cameras, and no colour, no appearance and no GPU.
 
+pub mod depth;
+mod error;
+pub mod hull;
 pub mod mesh;
 
-pub use mesh::{Mesh, TexturedMesh};
+pub use depth::DepthMap;
+pub use error::GeometryError;
+pub use hull::{Hull, HullOptions, HullReport, visual_hull};
+pub use mesh::{Mesh, MeshCheck, TexturedMesh};

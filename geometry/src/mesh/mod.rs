@@ -1,5 +1,9 @@
 //! Indexed triangle meshes. Triangles are counter-clockwise seen from outside.
 
+mod check;
+
+pub use check::MeshCheck;
+
 use capture::Aabb;
 use nalgebra::{Point2, Point3, Vector3};
 
