@@ -1,7 +1,6 @@
 //! The records of a comparison, and how views are averaged.
 
 use super::{Cost, Judged};
-use crate::playback;
 use crate::stages::Stage;
 use serde::Serialize;
 use texture::Method;
@@ -59,7 +58,7 @@ pub struct MethodFigures {
     pub bytes: u64,
     /// Appearance as raw 8-bit layers.
     pub bytes_raw: u64,
-    /// Seconds to fit.
+    /// Seconds to fit, with what all methods share of it.
     pub build_s: f64,
     /// Median milliseconds per frame, from the eye to the picture.
     pub frame_ms: f64,
@@ -123,7 +122,7 @@ impl MethodFigures {
         let errors = over(|v| v.error_mean_pct);
         let inner: Vec<f64> = views.iter().filter_map(|v| v.error_inner_pct).collect();
         Self {
-            method: playback::method_name(method),
+            method: method.name(),
             error_mean_pct: round6(mean(&errors)),
             error_max_pct: round6(errors.iter().copied().fold(0.0, f64::max)),
             error_variance: round6(variance(&errors)),

@@ -27,7 +27,8 @@ use nalgebra::Point3;
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
-use texture::{FitOptions, Method, Model, metrics};
+use surface::Probes;
+use texture::{Bake, FitOptions, Method, Model, metrics};
 
 /// A test view closer than this to a training view, seen from the object, shows nothing new.
 pub const LEAK_DEG: f64 = 2.0;
@@ -76,15 +77,19 @@ pub fn compare(
         stages.observer().noted(&format!("{n} test views within {LEAK_DEG}° of a training view are left out"));
     }
     let held_out = stages.run("load test views", |_| capture.load_views(&test, &options.load))?;
-    let surface = stages.run("surface points", |_| surface::Probes::new(&mesh, &held_out));
+    let start = Instant::now();
+    let bake = stages.run("bake", |_| Bake::new(&train, &mesh, &options.fit))?;
+    let bake_s = start.elapsed().as_secs_f64();
+    let probes = stages.run("probe surface", |_| Probes::new(&bake, &train, &held_out));
     if let Some(report) = report {
         stages.run("write references", |_| write_references(&held_out, report))?;
     }
     let mut methods = Vec::with_capacity(options.methods.len());
     for &method in &options.methods {
-        let (model, cost) = fit_and_store(&train, &mesh, method, &options.fit, stages)?;
-        let judged = stages.run(&format!("render {}", playback::method_name(method)), |observer| {
-            judge(&model, &held_out, &surface, report, observer)
+        let (model, mut cost) = fit_and_store(&bake, method, &options.fit, stages)?;
+        cost.build_s += bake_s;
+        let judged = stages.run(&format!("render {}", method.name()), |observer| {
+            judge(&model, &held_out, &probes, report, observer)
         })?;
         methods.push(MethodFigures::new(method, cost, judged));
     }
@@ -146,38 +151,37 @@ fn write_references(views: &[View], report: &OutputFolder) -> Result<(), Error> 
 
 /// Fits a method and takes it through its file, so that what is judged is what a user gets.
 fn fit_and_store(
-    train: &[View],
-    mesh: &TexturedMesh,
+    bake: &Bake<'_>,
     method: Method,
     options: &FitOptions,
     stages: &mut Stages<'_>,
 ) -> Result<(Model, Cost), Error> {
     let start = Instant::now();
-    let name = playback::method_name(method);
-    let (model, _) = stages.run(&format!("fit {name}"), |_| texture::fit(train, mesh, method, options))?;
+    let name = method.name();
+    let (model, _) = stages.run(&format!("fit {name}"), |_| texture::fit(bake, method, options))?;
     let build_s = start.elapsed().as_secs_f64();
     let stored = stages.run(&format!("store {name}"), |_| {
-        let glb = model.to_glb()?;
-        Model::from_glb(&glb, Path::new(name)).map(|model| (model, glb))
+        let bytes = model.bytes()?;
+        Model::from_glb(&model.to_glb()?, Path::new(name)).map(|model| (model, bytes))
     });
-    let (model, glb) = stored?;
-    let [bytes, bytes_raw] = playback::appearance_bytes(&model, &glb);
-    Ok((model, Cost { build_s, bytes, bytes_raw }))
+    let (model, bytes) = stored?;
+    Ok((model, Cost { build_s, bytes: bytes.appearance, bytes_raw: bytes.appearance_raw }))
 }
 
 fn judge(
     model: &Model,
     views: &[View],
-    surface: &surface::Probes,
+    probes: &Probes,
     report: Option<&OutputFolder>,
     observer: &dyn Observer,
 ) -> Result<Judged, Error> {
-    let name = playback::method_name(model.method);
+    let name = model.method.name();
     let mut player = playback::player(model);
     let mut judged = Vec::with_capacity(views.len());
     let mut times_ms = Vec::with_capacity(views.len());
     let mut seams = Vec::new();
     for batch in views.chunks(BATCH) {
+        let first = judged.len();
         let mut frames = Vec::with_capacity(batch.len());
         for view in batch {
             let start = Instant::now();
@@ -187,12 +191,13 @@ fn judge(
         let scored: Result<Vec<_>, Error> =
             batch.par_iter().zip(&frames).map(|(view, frame)| score_view(view, frame, name, report)).collect();
         judged.extend(scored?);
-        seams.extend(batch.iter().zip(&frames).filter_map(|(view, frame)| surface.seam(view, frame)));
+        let seam = |(i, (view, frame))| probes.seam(first + i, view, frame);
+        seams.extend(batch.iter().zip(&frames).enumerate().filter_map(seam));
         observer.advanced(judged.len(), views.len());
     }
     let frame_size = views.first().map_or([0, 0], |v| [v.image.width(), v.image.height()]);
     let seam = (!seams.is_empty()).then(|| round6(seams.iter().sum::<f64>() / seams.len() as f64));
-    let temporal = surface.temporal(model).map(round6);
+    let temporal = probes.temporal(model).map(round6);
     Ok(Judged { views: judged, seam, temporal, frame_ms: figures::median(times_ms), frame_size })
 }
 
