@@ -21,8 +21,10 @@ mod formats;
 mod image;
 mod load;
 mod masks;
+mod matte;
 mod pixels;
 pub mod silhouette;
+mod votes;
 mod write;
 
 pub use camera::{Camera, Distortion, Intrinsics, Projected, Ray};
@@ -32,4 +34,5 @@ pub use error::CaptureError;
 pub use formats::{CaptureFormat, detect_format};
 pub use image::Image;
 pub use masks::MaskSource;
+pub use matte::{erode, grow, is_binary, signed_distance, smooth};
 pub use pixels::{read_matte, read_rgb, write_matte, write_rgb};

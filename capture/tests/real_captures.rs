@@ -68,3 +68,38 @@ fn oxford_matrices_decompose_and_come_back() {
         assert!((scale * p(k / 4, k % 4) - expected).abs() < 1e-9, "entry {k}");
     }
 }
+
+/// Mean and smallest intersection over union of the silhouettes found with the scoring masks.
+fn silhouette_iou(name: &str) -> Option<(f64, f64)> {
+    let capture = Capture::read(&data(name)?).unwrap();
+    let options = LoadOptions { downscale: 1 };
+    let start = std::time::Instant::now();
+    let found = capture.clone().without_masks().load_all_views(&options).unwrap();
+    let elapsed = start.elapsed().as_secs_f64();
+    let given = capture.load_all_views(&options).unwrap();
+    let scores: Vec<f64> = found.iter().zip(&given).map(|(f, g)| iou(f, g)).collect();
+    let mean = scores.iter().sum::<f64>() / scores.len() as f64;
+    let (worst, least) = scores.iter().enumerate().min_by(|a, b| a.1.total_cmp(b.1)).unwrap();
+    println!("{name}: IoU mean {mean:.4}, least {least:.4} ({}), {elapsed:.1} s", found[worst].name);
+    if let Ok(folder) = std::env::var("SHOW_SILHOUETTES") {
+        let differences: Vec<[u8; 3]> =
+            found[worst].matte.pixels().iter().zip(given[worst].matte.pixels()).map(|(&f, &g)| [f, g, g]).collect();
+        let m = &found[worst].matte;
+        let picture = capture::Image::from_pixels(m.width(), m.height(), differences).unwrap();
+        capture::write_rgb(&Path::new(&folder).join(format!("{name}.png")), &picture).unwrap();
+    }
+    Some((mean, *least))
+}
+
+fn iou(a: &capture::View, b: &capture::View) -> f64 {
+    let pairs = || a.matte.pixels().iter().zip(b.matte.pixels()).map(|(&a, &b)| (a >= 128, b >= 128));
+    pairs().filter(|&(a, b)| a && b).count() as f64 / pairs().filter(|&(a, b)| a || b).count() as f64
+}
+
+#[test]
+fn silhouettes_agree_with_the_scoring_masks() {
+    for name in ["templeRing", "dinoRing", "oxford_dinosaur", "squirrel_turntable", "ethz_david"] {
+        let Some((mean, _)) = silhouette_iou(name) else { continue };
+        assert!(mean > 0.5, "{name}: {mean}");
+    }
+}

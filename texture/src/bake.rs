@@ -1,12 +1,12 @@
 //! What all four appearances are fitted from: photographs asked about the texels of one mesh.
 
+use crate::TextureError;
 use crate::directions::{Layout, layout};
 use crate::facets::{Facets, partition};
 use crate::layers::spread_labels;
 use crate::model::FitOptions;
 use crate::observe::{Observer, Samples};
 use crate::surface::SurfaceTexels;
-use crate::TextureError;
 use capture::{Image, View};
 use geometry::TexturedMesh;
 use geometry::atlas::PushPull;
@@ -73,7 +73,7 @@ impl<'a> Bake<'a> {
         let mut image = Image::filled(width, height, [0.0f32; 3]);
         let mut mask = Image::filled(width, height, false);
         for ((texels, values), known) in self.facets.texels.iter().zip(values).zip(known) {
-            for ((&t, value), _) in texels.iter().zip(values).zip(known).filter(|(_, &known)| known) {
+            for ((&t, value), _) in texels.iter().zip(values).zip(known).filter(|(_, known)| **known) {
                 let at = self.surface.index[t as usize] as usize;
                 image.pixels_mut()[at] = *value;
                 mask.pixels_mut()[at] = true;

@@ -10,7 +10,8 @@
 //!   spherical Delaunay about them. Edges are the border, for queries outside.
 //! * *A single ring* (a turntable): triangulating directions on one circle gives slivers between
 //!   sites far apart, hence jumps. The complex is then the edges between neighbours in azimuth
-//!   about the ring's axis, closed where the ring is closed, and it has no seam.
+//!   about the ring's axis, closed where the ring is closed, and a query is placed by its azimuth
+//!   alone: no seam, and no jump for an eye above or below the ring, where the nearest point would jump.
 //!
 //! Source: Jagersand, Birkbeck, Cobzas, section 4 (the chart of the triangulation is not given
 //! there). Cost: O(n log n) to build, O(triangles + edges) a query.
@@ -33,6 +34,8 @@ pub struct DirectionComplex {
     sites: Vec<Vector3<f64>>,
     triangles: Vec<[u32; 3]>,
     edges: Vec<[u32; 2]>,
+    /// The axis of a single ring.
+    ring: Option<Vector3<f64>>,
     /// Rows give barycentric weights up to scale: the inverse of `[a b c]`.
     inverses: Vec<Matrix3<f64>>,
 }
@@ -102,7 +105,10 @@ pub fn merge_directions(directions: &[Vector3<f64>]) -> Vec<Vec<usize>> {
 fn median_spacing(directions: &[Vector3<f64>]) -> f64 {
     let mut nearest: Vec<f64> = (0..directions.len())
         .filter_map(|i| {
-            (0..directions.len()).filter(|&j| j != i).map(|j| angle(&directions[i], &directions[j])).min_by(f64::total_cmp)
+            (0..directions.len())
+                .filter(|&j| j != i)
+                .map(|j| angle(&directions[i], &directions[j]))
+                .min_by(f64::total_cmp)
         })
         .collect();
     nearest.sort_by(f64::total_cmp);
@@ -121,24 +127,39 @@ impl DirectionComplex {
             Layout::Ring(axis) => (Vec::new(), ring_edges(sites, &axis)),
             Layout::General => delaunay(sites),
         };
-        Self::assemble(sites.to_vec(), triangles, edges)
+        Self::assemble(sites.to_vec(), triangles, edges, layout)
     }
 
     /// A complex as stored; `None` where an index points outside or a direction is not finite and unit.
-    pub fn from_parts(sites: Vec<Vector3<f64>>, triangles: Vec<[u32; 3]>, edges: Vec<[u32; 2]>) -> Option<Self> {
+    pub fn from_parts(
+        sites: Vec<Vector3<f64>>,
+        triangles: Vec<[u32; 3]>,
+        edges: Vec<[u32; 2]>,
+        layout: Layout,
+    ) -> Option<Self> {
         let n = sites.len() as u32;
-        let sound = sites.iter().all(|s| (s.norm() - 1.0).abs() < 1e-3)
-            && triangles.iter().flatten().chain(edges.iter().flatten()).all(|&i| i < n);
-        sound.then(|| Self::assemble(sites, triangles, edges))
+        let unit = |s: &Vector3<f64>| (s.norm() - 1.0).abs() < 1e-3;
+        let sound = sites.iter().all(unit)
+            && triangles.iter().flatten().chain(edges.iter().flatten()).all(|&i| i < n)
+            && !matches!(layout, Layout::Ring(axis) if !unit(&axis));
+        sound.then(|| Self::assemble(sites, triangles, edges, layout))
     }
 
-    fn assemble(sites: Vec<Vector3<f64>>, triangles: Vec<[u32; 3]>, edges: Vec<[u32; 2]>) -> Self {
+    fn assemble(sites: Vec<Vector3<f64>>, triangles: Vec<[u32; 3]>, edges: Vec<[u32; 2]>, layout: Layout) -> Self {
+        let ring = match layout {
+            Layout::Ring(axis) => Some(axis),
+            Layout::General => None,
+        };
         let corner = |i: u32| sites[i as usize];
         let inverses = triangles
             .iter()
-            .map(|t| Matrix3::from_columns(&[corner(t[0]), corner(t[1]), corner(t[2])]).try_inverse().unwrap_or_else(Matrix3::zeros))
+            .map(|t| {
+                Matrix3::from_columns(&[corner(t[0]), corner(t[1]), corner(t[2])])
+                    .try_inverse()
+                    .unwrap_or_else(Matrix3::zeros)
+            })
             .collect();
-        Self { sites, triangles, edges, inverses }
+        Self { sites, triangles, edges, ring, inverses }
     }
 
     /// The directions.
@@ -149,6 +170,11 @@ impl DirectionComplex {
     /// Triangles, as sites.
     pub fn triangles(&self) -> &[[u32; 3]] {
         &self.triangles
+    }
+
+    /// The axis of a single ring; `None` for any other layout.
+    pub fn ring(&self) -> Option<Vector3<f64>> {
+        self.ring
     }
 
     /// Edges that a query outside all triangles is carried to.
@@ -165,7 +191,25 @@ impl DirectionComplex {
         let Some(d) = query.try_normalize(1e-300).filter(|d| d.iter().all(|c| c.is_finite())) else {
             return Some(Blend::site(0));
         };
-        Some(self.inside(&d).unwrap_or_else(|| self.nearest(&d)))
+        Some(match self.ring {
+            Some(axis) => self.by_azimuth(&d, &axis),
+            None => self.inside(&d).unwrap_or_else(|| self.nearest(&d)),
+        })
+    }
+
+    /// The edge that spans the azimuth of `d` about `axis`; the site nearest in azimuth where none does.
+    fn by_azimuth(&self, d: &Vector3<f64>, axis: &Vector3<f64>) -> Blend {
+        for &[i, j] in &self.edges {
+            let start = &self.sites[i as usize];
+            let (along, span) = (turn(start, d, axis), turn(start, &self.sites[j as usize], axis));
+            if span > 0.0 && along >= 0.0 && along <= span {
+                let t = along / span;
+                return Blend { entries: [(i, 1.0 - t), (j, t), (0, 0.0)] };
+            }
+        }
+        let off = |i: &u32| turn(&self.sites[*i as usize], d, axis).abs();
+        let nearest = (0..self.sites.len() as u32).min_by(|a, b| off(a).total_cmp(&off(b)));
+        Blend::site(nearest.unwrap_or(0))
     }
 
     /// Barycentric weights in the triangle around `d`.
@@ -215,6 +259,12 @@ fn project_to_arc(d: &Vector3<f64>, a: &Vector3<f64>, b: &Vector3<f64>) -> Optio
     let span = angle(a, b);
     let along = normal.dot(&a.cross(&foot)).atan2(a.dot(&foot));
     (along >= 0.0 && along <= span).then(|| (foot.dot(d), along / span))
+}
+
+/// The angle in −π..=π by which the azimuth of `to` about `axis` is ahead of that of `from`.
+fn turn(from: &Vector3<f64>, to: &Vector3<f64>, axis: &Vector3<f64>) -> f64 {
+    let from = from - axis * axis.dot(from);
+    axis.dot(&from.cross(to)).atan2(from.dot(to))
 }
 
 /// Edges between neighbours in azimuth about `axis`.
@@ -326,7 +376,8 @@ mod tests {
         check_unit_at_sites(&complex);
         // A step of 1/10000 turn moves a weight by 24/10000 between neighbours.
         check_continuous(&complex, 0.4, 0.0035);
-        check_continuous(&complex, 0.6, 0.006);
+        check_continuous(&complex, 0.9, 0.0035);
+        check_continuous(&complex, -0.3, 0.0035);
     }
 
     #[test]
@@ -342,7 +393,8 @@ mod tests {
     fn weights_do_not_depend_on_the_frame() {
         let turn = nalgebra::Rotation3::from_euler_angles(0.3, -1.1, 2.0);
         let turned: Vec<_> = dome().iter().map(|d| turn * d).collect();
-        let (a, b) = (DirectionComplex::build(&dome(), Layout::General), DirectionComplex::build(&turned, Layout::General));
+        let (a, b) =
+            (DirectionComplex::build(&dome(), Layout::General), DirectionComplex::build(&turned, Layout::General));
         // Off the mirror planes of the rings, where Delaunay is unique.
         for q in [Vector3::new(0.9, 0.13, 0.4), Vector3::new(-0.2, 0.77, 0.61)] {
             let (w, v) = (dense(&a, q), dense(&b, turn * q));
@@ -382,7 +434,13 @@ mod tests {
 
     #[test]
     fn an_index_out_of_range_is_refused() {
-        assert!(DirectionComplex::from_parts(vec![Vector3::x()], vec![[0, 1, 0]], vec![]).is_none(), "triangle");
-        assert!(DirectionComplex::from_parts(vec![Vector3::x() * 2.0], vec![], vec![]).is_none(), "not unit");
+        assert!(
+            DirectionComplex::from_parts(vec![Vector3::x()], vec![[0, 1, 0]], vec![], Layout::General).is_none(),
+            "triangle"
+        );
+        assert!(
+            DirectionComplex::from_parts(vec![Vector3::x() * 2.0], vec![], vec![], Layout::General).is_none(),
+            "not unit"
+        );
     }
 }

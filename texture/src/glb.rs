@@ -4,13 +4,13 @@
 //! `docs/model-format.md` specifies it. Buffers are little-endian; every accessor has its own view.
 //! Reading trusts nothing: counts are checked against the bytes that are there before anything is allocated.
 
+use crate::TextureError;
 use crate::appearance::{Lumigraph, static_texture::base_layer};
 use crate::coding;
-use crate::directions::DirectionComplex;
+use crate::directions::{DirectionComplex, Layout};
 use crate::layers::{FacetWeights, Layer, Layers};
 use crate::model::{Appearance, FitOptions, Method, Model};
 use crate::surface::SurfaceTexels;
-use crate::TextureError;
 use capture::Image;
 use geometry::{Mesh, TexturedMesh};
 use gltf::binary::{Glb, Header};
@@ -60,6 +60,8 @@ struct Extension {
     coefficient_scales: Vec<f32>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     rays: Vec<RayEntry>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    ring_axis: Option<[f64; 3]>,
     #[serde(skip_serializing_if = "Option::is_none")]
     camera_centers: Option<usize>,
 }
@@ -136,7 +138,10 @@ pub(crate) fn sizes(model: &Model) -> Result<(u64, u64), TextureError> {
 }
 
 fn assemble(model: &Model) -> Result<(Vec<u8>, u64), TextureError> {
-    let refused = |fault: &str| TextureError::Degenerate { fault: fault.to_owned(), remedy: "use coarser texels or fewer layers".to_owned() };
+    let refused = |fault: &str| TextureError::Degenerate {
+        fault: fault.to_owned(),
+        remedy: "use coarser texels or fewer layers".to_owned(),
+    };
     let mut w = Writer::default();
     let primitive = write_mesh(&mut w, &model.mesh);
     let (extension, preview) = match &model.appearance {
@@ -147,7 +152,8 @@ fn assemble(model: &Model) -> Result<(Vec<u8>, u64), TextureError> {
     let extension = serde_json::to_value(extension).map_err(|e| refused(&e.to_string()))?;
     let root = root(&w, primitive, extension, preview);
     let json = serde_json::to_vec(&root).map_err(|e| refused(&e.to_string()))?;
-    let length = u32::try_from(w.bin.len() + json.len() + 64).map_err(|e| refused(&format!("the file passes 4 GiB ({e})")))?;
+    let length =
+        u32::try_from(w.bin.len() + json.len() + 64).map_err(|e| refused(&format!("the file passes 4 GiB ({e})")))?;
     let header = Header { magic: *b"glTF", version: 2, length };
     let appearance = w.appearance;
     let glb = Glb { header, json: Cow::Owned(json), bin: Some(Cow::Owned(w.bin)) };
@@ -207,6 +213,7 @@ fn blank(model: &Model) -> Extension {
         coefficients: None,
         coefficient_scales: Vec::new(),
         rays: Vec::new(),
+        ring_axis: None,
         camera_centers: None,
     }
 }
@@ -220,6 +227,7 @@ fn write_layers(w: &mut Writer, model: &Model, layers: &Layers) -> Option<(Exten
     }
     let map = layers.facet_of_texel.map(|f| [f.to_le_bytes()[0], f.to_le_bytes()[1], 0]);
     e.facet_map = Some(w.part_image(&coding::encode_png(&map)?, "facet map".to_owned()));
+    e.ring_axis = layers.facets.iter().find_map(|f| f.complex.ring()).map(Into::into);
     write_facets(w, &mut e, &layers.facets)?;
     let preview = match model.method {
         Method::Vdtm => w.image(&mean_of_layers(layers)?, "preview".to_owned()),
@@ -280,7 +288,12 @@ fn snorm(v: f64) -> i16 {
     (v.clamp(-1.0, 1.0) * 32767.0).round() as i16
 }
 
-fn write_lumigraph(w: &mut Writer, model: &Model, rays: &Lumigraph, surface: &SurfaceTexels) -> Option<(Extension, usize)> {
+fn write_lumigraph(
+    w: &mut Writer,
+    model: &Model,
+    rays: &Lumigraph,
+    surface: &SurfaceTexels,
+) -> Option<(Extension, usize)> {
     let mut e = blank(model);
     for (k, pair) in rays.coded.chunks_exact(2).enumerate() {
         let color = w.part_image(&pair[0], format!("ray colours {k}"));
@@ -305,9 +318,12 @@ impl<'a> Reader<'a> {
     fn view(&self, index: usize) -> Result<&'a [u8], String> {
         let view = self.root["bufferViews"].get(index).ok_or_else(|| format!("buffer view {index} is missing"))?;
         let number = |key: &str| view.get(key).map_or(Some(0), Value::as_u64).and_then(|v| usize::try_from(v).ok());
-        let (start, length) = number("byteOffset").zip(number("byteLength")).ok_or_else(|| format!("buffer view {index} has no range"))?;
+        let (start, length) = number("byteOffset")
+            .zip(number("byteLength"))
+            .ok_or_else(|| format!("buffer view {index} has no range"))?;
         let end = start.checked_add(length).filter(|&end| end <= self.bin.len());
-        end.map(|end| &self.bin[start..end]).ok_or_else(|| format!("buffer view {index} reaches past the end of the file"))
+        end.map(|end| &self.bin[start..end])
+            .ok_or_else(|| format!("buffer view {index} reaches past the end of the file"))
     }
 
     /// The elements of an accessor as bytes, `width` bytes each, and how many there are.
@@ -317,10 +333,12 @@ impl<'a> Reader<'a> {
             return Err(format!("accessor {index} is not {kind} of component type {component}"));
         }
         let field = |key: &str| a.get(key).and_then(Value::as_u64).and_then(|v| usize::try_from(v).ok());
-        let (view, count) = field("bufferView").zip(field("count")).ok_or_else(|| format!("accessor {index} has no data"))?;
+        let (view, count) =
+            field("bufferView").zip(field("count")).ok_or_else(|| format!("accessor {index} has no data"))?;
         let bytes = self.view(view)?;
         let length = count.checked_mul(width).filter(|&l| l <= bytes.len());
-        let length = length.ok_or_else(|| format!("accessor {index} counts more elements than its buffer view holds"))?;
+        let length =
+            length.ok_or_else(|| format!("accessor {index} counts more elements than its buffer view holds"))?;
         Ok((&bytes[..length], count))
     }
 
@@ -372,7 +390,8 @@ pub(crate) fn read(bytes: &[u8]) -> Result<Model, String> {
     }
     let method: Method = e.method.parse()?;
     let mesh = read_mesh(&reader, e.atlas_size)?;
-    let appearance = if method == Method::Lumigraph { read_lumigraph(&reader, &e, &mesh)? } else { read_layers(&reader, &e)? };
+    let appearance =
+        if method == Method::Lumigraph { read_lumigraph(&reader, &e, &mesh)? } else { read_layers(&reader, &e)? };
     Ok(Model { mesh, method, appearance })
 }
 
@@ -436,7 +455,8 @@ fn read_layers(r: &Reader<'_>, e: &Extension) -> Result<Appearance, String> {
     if e.layers.is_empty() {
         return Err("it has no layers".to_owned());
     }
-    let layers = e.layers.iter().enumerate().map(|(k, entry)| read_layer(r, e, k, entry)).collect::<Result<Vec<_>, _>>()?;
+    let layers =
+        e.layers.iter().enumerate().map(|(k, entry)| read_layer(r, e, k, entry)).collect::<Result<Vec<_>, _>>()?;
     let map = coding::decode(r.image(e.facet_map.ok_or("it has no facet map")?)?, e.atlas_size)?;
     let facet_of_texel = map.map(|[low, high, _]| u16::from_le_bytes([low, high]));
     let facets = read_facets(r, e)?;
@@ -467,21 +487,25 @@ fn read_facets(r: &Reader<'_>, e: &Extension) -> Result<Vec<FacetWeights>, Strin
     }
     let directions = r.snorms(e.directions, "VEC3", 3)?;
     let mut directions = Taker(directions.as_chunks::<3>().0, "directions");
-    let (triangles, edges) = (r.shorts(e.triangles, UNSIGNED_SHORT, "SCALAR", 1)?, r.shorts(e.edges, UNSIGNED_SHORT, "SCALAR", 1)?);
+    let (triangles, edges) =
+        (r.shorts(e.triangles, UNSIGNED_SHORT, "SCALAR", 1)?, r.shorts(e.edges, UNSIGNED_SHORT, "SCALAR", 1)?);
     let mut triangles = Taker(triangles.as_chunks::<3>().0, "triangles");
     let mut edges = Taker(edges.as_chunks::<2>().0, "edges");
     let coefficients = r.snorms(e.coefficients, "SCALAR", 1)?;
     let mut coefficients = Taker(&coefficients, "coefficients");
+    let layout = e.ring_axis.map_or(Layout::General, |axis| Layout::Ring(axis.into()));
     let mut facets = Vec::with_capacity(counts.len());
     for (n, (&[s, t, d, rank], &center)) in counts.iter().zip(&centers).enumerate() {
         let [s, t, d, rank] = [s, t, d, rank].map(usize::from);
         if rank == 0 || rank > e.layers.len() {
             return Err(format!("facet {n} uses {rank} of {} layers", e.layers.len()));
         }
-        let sites = directions.take(s)?.iter().map(|&d| Vector3::from(d).try_normalize(0.5).unwrap_or_default()).collect();
+        let sites =
+            directions.take(s)?.iter().map(|&d| Vector3::from(d).try_normalize(0.5).unwrap_or_default()).collect();
         let triangles = triangles.take(t)?.iter().map(|t| t.map(u32::from)).collect();
         let edges = edges.take(d)?.iter().map(|t| t.map(u32::from)).collect();
-        let complex = DirectionComplex::from_parts(sites, triangles, edges).ok_or_else(|| format!("facet {n} has an unsound triangulation"))?;
+        let complex = DirectionComplex::from_parts(sites, triangles, edges, layout)
+            .ok_or_else(|| format!("facet {n} has an unsound triangulation"))?;
         let table = coefficients.take(s * rank)?;
         let table = table.iter().enumerate().map(|(i, y)| *y as f32 * e.coefficient_scales[i % rank]).collect();
         facets.push(FacetWeights { center, complex, rank, table });
@@ -494,7 +518,8 @@ struct Taker<'a, T>(&'a [T], &'static str);
 
 impl<'a, T> Taker<'a, T> {
     fn take(&mut self, count: usize) -> Result<&'a [T], String> {
-        let (head, tail) = self.0.split_at_checked(count).ok_or_else(|| format!("its facets want more {} than there are", self.1))?;
+        let (head, tail) =
+            self.0.split_at_checked(count).ok_or_else(|| format!("its facets want more {} than there are", self.1))?;
         self.0 = tail;
         Ok(head)
     }

@@ -1,11 +1,11 @@
 //! A mesh and one appearance: what a `.glb` of ours holds.
 
+use crate::TextureError;
 use crate::appearance::{Lumigraph, dyntex, lumigraph, static_texture, vdtm};
 use crate::bake::Bake;
 use crate::glb;
 use crate::layers::Layers;
 use crate::surface::SurfaceTexels;
-use crate::TextureError;
 use capture::Image;
 use geometry::TexturedMesh;
 use nalgebra::Point3;
@@ -124,9 +124,8 @@ pub fn fit(bake: &Bake<'_>, method: Method, options: &FitOptions) -> Result<(Mod
         Method::Static => static_texture::fit(bake, options).map(layered),
         Method::Vdtm => vdtm::fit(bake, options).map(layered),
         Method::DynTex => dyntex::fit(bake, options).map(layered),
-        Method::Lumigraph => {
-            lumigraph::fit(bake, options).map(|(rays, unseen)| (Appearance::Lumigraph(rays, bake.surface.clone()), unseen))
-        }
+        Method::Lumigraph => lumigraph::fit(bake, options)
+            .map(|(rays, unseen)| (Appearance::Lumigraph(rays, bake.surface.clone()), unseen)),
     };
     let (appearance, unseen_texels) = fitted.ok_or_else(|| TextureError::Degenerate {
         fault: format!("an atlas of {:?} texels cannot be coded", bake.surface.size),

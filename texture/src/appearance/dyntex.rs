@@ -50,7 +50,8 @@ pub(crate) fn fit(bake: &Bake<'_>, options: &FitOptions) -> Option<(Layers, usiz
     }
     let decoded: Vec<Image<[f32; 3]>> =
         layers.iter().map(|l| l.texels.map(|t| t.map(|v| l.offset + l.scale * f32::from(v)))).collect();
-    let facets = (0..count).into_par_iter().map(|f| facet_weights(bake, f, 1 + bases[f].layers.len(), &decoded)).collect();
+    let facets =
+        (0..count).into_par_iter().map(|f| facet_weights(bake, f, 1 + bases[f].layers.len(), &decoded)).collect();
     Some((Layers { layers, facet_of_texel: bake.facet_of_texel(), facets }, unseen))
 }
 
@@ -95,7 +96,8 @@ fn components(data: &DMatrix<f64>, most: usize, tolerance: f64) -> Vec<Vec<[f32;
     let floor = (largest * GRAM_FLOOR * GRAM_FLOOR).max(tolerance * tolerance * (views * values) as f64);
     order.retain(|&k| eigen.eigenvalues[k] > floor && eigen.eigenvalues[k] > 0.0);
     order.truncate(most);
-    let vectors = DMatrix::from_fn(order.len(), views, |k, j| eigen.eigenvectors[(j, order[k])] / (views as f64).sqrt());
+    let vectors =
+        DMatrix::from_fn(order.len(), views, |k, j| eigen.eigenvectors[(j, order[k])] / (views as f64).sqrt());
     let layers = vectors * data;
     layers.row_iter().map(|row| signed(&row.iter().map(|&v| v as f32).collect::<Vec<_>>())).collect()
 }
@@ -146,10 +148,17 @@ fn facet_weights(bake: &Bake<'_>, facet: usize, rank: usize, decoded: &[Image<[f
     let mut table = Vec::with_capacity(groups.len() * rank);
     for group in &groups {
         table.push(1.0);
-        (0..rank - 1).for_each(|k| table.push(group.iter().map(|&j| coefficients[(k, j)]).sum::<f64>() as f32 / group.len() as f32));
+        (0..rank - 1).for_each(|k| {
+            table.push(group.iter().map(|&j| coefficients[(k, j)]).sum::<f64>() as f32 / group.len() as f32)
+        });
     }
     let sites: Vec<_> = groups.iter().map(|g| own[g[0]]).collect();
-    FacetWeights { center: bake.facets.centers[facet], complex: DirectionComplex::build(&sites, bake.layout), rank, table }
+    FacetWeights {
+        center: bake.facets.centers[facet],
+        complex: DirectionComplex::build(&sites, bake.layout),
+        rank,
+        table,
+    }
 }
 
 /// `argmin_Y ‖D − B Y‖²` with a ridge far below the layers' energy: rank−1 × views.

@@ -70,7 +70,8 @@ fn facet_rays(bake: &Bake<'_>, facet: usize, rays: usize) -> Vec<Vec<(u16, [u8; 
 
 /// Up to `rays` observations: the best seen one, then always the one farthest from those chosen.
 fn choose(row: &[Observation], directions: &[Vector3<f64>], rays: usize) -> Vec<(u16, [u8; 3])> {
-    let mut open: Vec<(usize, f64)> = (0..row.len()).filter(|&j| row[j].weight > 0.0).map(|j| (j, f64::INFINITY)).collect();
+    let mut open: Vec<(usize, f64)> =
+        (0..row.len()).filter(|&j| row[j].weight > 0.0).map(|j| (j, f64::INFINITY)).collect();
     let mut chosen: Vec<usize> = Vec::new();
     while chosen.len() < rays && !open.is_empty() {
         let value = |&(j, far): &(usize, f64)| if far.is_infinite() { 1e3 * f64::from(row[j].weight) } else { far };
@@ -142,7 +143,10 @@ impl Lumigraph {
         let mut image = Image::filled(surface.size[0], surface.size[1], [0.0f32; 3]);
         let mut mask = Image::filled(surface.size[0], surface.size[1], false);
         for (t, &at) in surface.index.iter().enumerate() {
-            let rays: Vec<[u8; 3]> = (t * self.rays..(t + 1) * self.rays).filter(|&k| self.views[k] != NO_RAY).map(|k| self.colors[k]).collect();
+            let rays: Vec<[u8; 3]> = (t * self.rays..(t + 1) * self.rays)
+                .filter(|&k| self.views[k] != NO_RAY)
+                .map(|k| self.colors[k])
+                .collect();
             if rays.is_empty() {
                 continue;
             }
@@ -156,7 +160,8 @@ impl Lumigraph {
 
     /// Colour and view images of every slot, in that order.
     fn encode(&self, surface: &SurfaceTexels) -> Option<Vec<Vec<u8>>> {
-        let slots: Vec<Option<[Vec<u8>; 2]>> = (0..self.rays).into_par_iter().map(|k| self.encode_slot(surface, k)).collect();
+        let slots: Vec<Option<[Vec<u8>; 2]>> =
+            (0..self.rays).into_par_iter().map(|k| self.encode_slot(surface, k)).collect();
         Some(slots.into_iter().collect::<Option<Vec<_>>>()?.into_iter().flatten().collect())
     }
 
@@ -174,7 +179,11 @@ impl Lumigraph {
     }
 
     /// Rebuilds the lumigraph from its slots as stored; `Err` says what is wrong.
-    pub(crate) fn decode(centers: Vec<Point3<f64>>, coded: Vec<Vec<u8>>, surface: &SurfaceTexels) -> Result<Self, String> {
+    pub(crate) fn decode(
+        centers: Vec<Point3<f64>>,
+        coded: Vec<Vec<u8>>,
+        surface: &SurfaceTexels,
+    ) -> Result<Self, String> {
         let rays = coded.len() / 2;
         let mut colors = vec![[0u8; 3]; surface.len() * rays];
         let mut views = vec![NO_RAY; surface.len() * rays];

@@ -7,18 +7,19 @@
 
 use crate::bake::Bake;
 use crate::coding;
+use crate::directions::DirectionComplex;
+use crate::directions::Layout;
 use crate::layers::{FacetWeights, Layer, Layers};
 use crate::model::FitOptions;
 use crate::observe::Observation;
-use crate::directions::DirectionComplex;
-use crate::directions::Layout;
 use capture::Image;
 use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
 
 /// Fits the texture; also says which texels were seen.
 pub(crate) fn fit(bake: &Bake<'_>, options: &FitOptions) -> Option<(Layers, usize)> {
-    let means: Vec<(Vec<[f32; 3]>, Vec<bool>)> = (0..bake.facets.texels.len()).into_par_iter().map(|f| facet_mean(bake, f)).collect();
+    let means: Vec<(Vec<[f32; 3]>, Vec<bool>)> =
+        (0..bake.facets.texels.len()).into_par_iter().map(|f| facet_mean(bake, f)).collect();
     let (values, known): (Vec<_>, Vec<_>) = means.into_iter().unzip();
     let unseen = known.iter().flatten().filter(|&&k| !k).count();
     let layer = base_layer(&bake.paint(&values, &known), options)?;

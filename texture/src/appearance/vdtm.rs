@@ -24,7 +24,9 @@ pub(crate) fn fit(bake: &Bake<'_>, options: &FitOptions) -> Option<(Layers, usiz
     let completed: Vec<Completed> =
         (0..bake.facets.texels.len()).into_par_iter().map(|f| complete_facet(bake, f, &sources)).collect();
     let unseen = completed.iter().flat_map(|c| &c.seen).filter(|&&s| !s).count();
-    let layers = (0..sources.len()).map(|s| base_layer(&source_image(bake, &completed, s), options)).collect::<Option<Vec<_>>>()?;
+    let layers = (0..sources.len())
+        .map(|s| base_layer(&source_image(bake, &completed, s), options))
+        .collect::<Option<Vec<_>>>()?;
     let facets = completed.iter().enumerate().map(|(f, c)| weights(bake, f, c, &sources)).collect();
     Some((Layers { layers, facet_of_texel: bake.facet_of_texel(), facets }, unseen))
 }
@@ -48,8 +50,9 @@ fn spread_sources(bake: &Bake<'_>, count: usize) -> Vec<usize> {
 
 fn complete_facet(bake: &Bake<'_>, facet: usize, sources: &[usize]) -> Completed {
     let all = bake.samples(facet);
-    let rows: Vec<Observation> =
-        (0..bake.facets.texels[facet].len()).flat_map(|i| sources.iter().map(|&j| all.row(i)[j]).collect::<Vec<_>>()).collect();
+    let rows: Vec<Observation> = (0..bake.facets.texels[facet].len())
+        .flat_map(|i| sources.iter().map(|&j| all.row(i)[j]).collect::<Vec<_>>())
+        .collect();
     let directions: Vec<Vector3<f64>> = pick(&bake.directions(facet), sources);
     complete(&Samples { views: sources.len(), rows }, &directions)
 }
@@ -79,5 +82,10 @@ fn weights(bake: &Bake<'_>, facet: usize, completed: &Completed, sources: &[usiz
     for (site, group) in groups.iter().enumerate() {
         group.iter().for_each(|&k| table[site * rank + completed.views[k]] = 1.0 / group.len() as f32);
     }
-    FacetWeights { center: bake.facets.centers[facet], complex: DirectionComplex::build(&sites, bake.layout), rank, table }
+    FacetWeights {
+        center: bake.facets.centers[facet],
+        complex: DirectionComplex::build(&sites, bake.layout),
+        rank,
+        table,
+    }
 }
