@@ -75,13 +75,13 @@ pub(crate) struct LoadArgs {
 #[derive(Clone, Debug, Args)]
 pub(crate) struct ShapeArgs {
     /// Grid cells along the object's longest side, or auto: one to two pixels a cell
-    #[arg(long, value_name = "N", default_value = "auto", value_parser = auto::<usize>)]
+    #[arg(long, value_name = "N", default_value = "auto", value_parser = resolution)]
     pub(crate) resolution: Auto<usize>,
     /// Forgive this many silhouettes that cut where all others do not; auto: chosen on the views
-    #[arg(long, value_name = "K", default_value = "auto", value_parser = auto::<usize>)]
+    #[arg(long, value_name = "K", default_value = "auto", value_parser = consensus)]
     pub(crate) consensus: Auto<usize>,
     /// Grow silhouettes by this many pixels before carving; auto: chosen on the views
-    #[arg(long, value_name = "PX", default_value = "auto", value_parser = auto::<f64>, allow_negative_numbers = true)]
+    #[arg(long, value_name = "PX", default_value = "auto", value_parser = grow, allow_negative_numbers = true)]
     pub(crate) grow: Auto<f64>,
 }
 
@@ -225,7 +225,7 @@ pub(crate) struct RenderArgs {
     #[arg(long, value_name = "FILE")]
     pub(crate) video: Option<PathBuf>,
     /// Frames per second of the film
-    #[arg(long, value_name = "N", default_value = "24")]
+    #[arg(long, value_name = "N", default_value = "24", value_parser = rate)]
     pub(crate) fps: f64,
     /// Size of the frames, where no camera gives it
     #[arg(long, value_name = "WxH", value_parser = size)]
@@ -263,11 +263,20 @@ pub(crate) struct SynthArgs {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Auto<T>(pub(crate) Option<T>);
 
-fn auto<T: std::str::FromStr>(text: &str) -> Result<Auto<T>, String> {
-    match text {
-        "auto" => Ok(Auto(None)),
-        _ => text.parse().map(|value| Auto(Some(value))).map_err(|_| "needs a number or auto".to_owned()),
-    }
+fn resolution(text: &str) -> Result<Auto<usize>, String> {
+    auto(text, |text| bounded(text, 4096))
+}
+
+fn consensus(text: &str) -> Result<Auto<usize>, String> {
+    auto(text, |text| text.parse().map_err(|fault| format!("needs a number of views or auto: {fault}")))
+}
+
+fn grow(text: &str) -> Result<Auto<f64>, String> {
+    auto(text, |text| within(text, -64.0, 64.0))
+}
+
+fn auto<T>(text: &str, parse: impl Fn(&str) -> Result<T, String>) -> Result<Auto<T>, String> {
+    if text == "auto" { Ok(Auto(None)) } else { parse(text).map(|value| Auto(Some(value))) }
 }
 
 fn bounded(text: &str, most: usize) -> Result<usize, String> {
@@ -295,9 +304,17 @@ fn size(text: &str) -> Result<[usize; 2], String> {
 }
 
 fn pixels(text: &str) -> Result<f64, String> {
+    within(text, 0.0, 1000.0)
+}
+
+fn rate(text: &str) -> Result<f64, String> {
+    within(text, 0.02, 650.0)
+}
+
+fn within(text: &str, least: f64, most: f64) -> Result<f64, String> {
     match text.parse() {
-        Ok(value) if (0.0..=1000.0).contains(&value) => Ok(value),
-        _ => Err("needs a number of pixels from 0 to 1000".to_owned()),
+        Ok(value) if (least..=most).contains(&value) => Ok(value),
+        _ => Err(format!("needs a number from {least} to {most}")),
     }
 }
 
@@ -308,5 +325,30 @@ fn axis(text: &str) -> Result<[f64; 3], String> {
         "y" => Ok([0.0, sign, 0.0]),
         "z" => Ok([0.0, 0.0, sign]),
         _ => Err("needs x, y, z, -x, -y or -z".to_owned()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn values_out_of_range_are_refused() {
+        for text in ["nan", "inf", "1e9", "", "x"] {
+            assert!(grow(text).is_err(), "{text}");
+        }
+        assert_eq!(grow("auto"), Ok(Auto(None)));
+        assert_eq!(grow("-0.5"), Ok(Auto(Some(-0.5))));
+        assert_eq!(size("640x480"), Ok([640, 480]));
+        for text in ["640", "0x5", "5x0", "99999x99999", "axb"] {
+            assert!(size(text).is_err(), "{text}");
+        }
+        assert_eq!(axis("-y"), Ok([0.0, -1.0, 0.0]));
     }
 }

@@ -180,7 +180,8 @@ pub fn capture_facts(capture: &Capture, format: &str, stages: &mut Stages<'_>) -
     let widest = capture.frames.iter().map(|frame| frame.camera.intrinsics.width).max().unwrap_or(0);
     let load = LoadOptions { downscale: (widest / CHECKED_WIDTH).max(1) };
     let views = stages.run("load", |_| capture.load_views(&positions, &load))?;
-    let ious = stages.run("check silhouettes", |_| coarse_hull(&views, capture.aabb).map(|h| silhouette_ious(&h, &views)));
+    let ious =
+        stages.run("check silhouettes", |_| coarse_hull(&views, capture.aabb).map(|h| silhouette_ious(&h, &views)));
     let mut facts = CaptureFacts {
         format: format.to_owned(),
         views: count,

@@ -104,10 +104,14 @@ impl OutputFolder {
 const MARK: &str = ".turnlight";
 
 fn refuse_foreign(target: &Path) -> Result<(), Error> {
-    let fault = match fs::read_dir(target) {
+    let entries = match fs::read_dir(target) {
         Err(_) if !target.exists() => return Ok(()),
+        entries => entries.map(Iterator::count),
+    };
+    let fault = match entries {
         Err(_) => "is there already and is no folder",
-        Ok(mut entries) if entries.next().is_none() || target.join(MARK).exists() => return Ok(()),
+        Ok(0) => return Ok(()),
+        Ok(_) if target.join(MARK).exists() => return Ok(()),
         Ok(_) => "is there already, with files that turnlight did not write",
     };
     Err(Error::Failed(format!("{}: {fault}; name another place or remove it", target.display())))

@@ -4,7 +4,7 @@ use crate::Error;
 use crate::stages::Stages;
 use capture::{Aabb, View};
 use geometry::hull::{HullOptions, visual_hull};
-use geometry::{Mesh, TexturedMesh, UnwrapOptions, unwrap_mesh};
+use geometry::{Mesh, SimplifyOptions, TexturedMesh, UnwrapOptions, unwrap_mesh};
 use nalgebra::Point3;
 use std::path::{Path, PathBuf};
 use texture::{Bake, FitOptions, FitReport, Method, Model};
@@ -54,7 +54,7 @@ pub fn shape(
     }
     let fine = hull(views, aabb, options, stages)?;
     let texel = texel_size(views, &fine)?;
-    let coarse = stages.run("simplify", |_| geometry::simplify(&fine, &simplify_options(texel)))?;
+    let coarse = stages.run("simplify", |_| geometry::simplify(&fine, &simplify_options(&fine, texel)))?.mesh;
     unwrap(&coarse, texel, stages)
 }
 
@@ -78,13 +78,22 @@ pub fn hull(
     Ok(stages.run("hull", |_| visual_hull(views, &hull_options))?.mesh)
 }
 
+/// A hull at one to two pixels a cell holds many more triangles than its silhouettes need.
+fn simplify_options(mesh: &Mesh, texel: f64) -> SimplifyOptions {
+    SimplifyOptions { target_faces: (mesh.faces.len() / 50).max(2000), max_error: Some(0.5 * texel) }
+}
+
 fn unwrap(mesh: &Mesh, texel: f64, stages: &mut Stages<'_>) -> Result<TexturedMesh, Error> {
     Ok(stages.run("atlas", |_| unwrap_mesh(mesh, &UnwrapOptions::new(texel)))?.mesh)
 }
 
 /// A mesh from a file, unfolded unless it comes with a valid atlas.
 fn brought(path: &Path, views: &[View], stages: &mut Stages<'_>) -> Result<TexturedMesh, Error> {
-    todo!()
+    let file = stages.run("read mesh", |_| geometry::read_mesh(path))?;
+    match file.uvs {
+        Some(textured) => Ok(textured),
+        None => unwrap(&file.mesh, texel_size(views, &file.mesh)?, stages),
+    }
 }
 
 /// World units that one pixel of the median view covers at the object: a texel for each.

@@ -60,8 +60,7 @@ impl<'a> Stages<'a> {
         self.observer.began(name);
         let start = Instant::now();
         let result = work(self.observer);
-        let stage =
-            Stage { stage: name.to_owned(), seconds: start.elapsed().as_secs_f64(), peak_bytes: peak_bytes() };
+        let stage = Stage { stage: name.to_owned(), seconds: start.elapsed().as_secs_f64(), peak_bytes: peak_bytes() };
         self.observer.ended(&stage);
         self.finished.push(stage);
         result

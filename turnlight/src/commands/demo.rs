@@ -76,11 +76,7 @@ fn turntable(model: &Model, capture: &Capture, path: &Path, observer: &dyn Obser
 }
 
 /// The four methods on the views left out.
-fn compare(
-    capture: &Capture,
-    folder: &OutputFolder,
-    stages: &mut Stages<'_>,
-) -> Result<evaluate::Comparison, Error> {
+fn compare(capture: &Capture, folder: &OutputFolder, stages: &mut Stages<'_>) -> Result<evaluate::Comparison, Error> {
     let count = capture.frames.len();
     let options = CompareOptions {
         train: (0..count).step_by(2).collect(),

@@ -14,7 +14,7 @@ pub(crate) fn run(args: &HullArgs, observer: &dyn Observer) -> Result<Answer, Er
     let mesh = pipeline::hull(&views, capture.aabb, &args.shape.options(), &mut stages)?;
     let iou = stages.run("check silhouettes", |_| inspect::silhouette_ious(&mesh, &views));
     stages.run("write", |_| geometry::write_mesh(&args.output, &mesh))?;
-    let facts = inspect::mesh_facts(&mesh);
+    let facts = inspect::mesh_facts(&mesh)?;
     let mean_iou = iou.iter().sum::<f64>() / iou.len().max(1) as f64;
     let text = format!("{}\nsilhouettes: mean IoU {mean_iou:.4}\nwrote {}", facts.text(), args.output.display());
     let mut json = json!(facts);

@@ -8,7 +8,7 @@ use std::path::Path;
 use turnlight::capture::detect_format;
 use turnlight::inspect::{self, MeshFacts, ModelFacts};
 use turnlight::stages::{Observer, Stages};
-use turnlight::texture::Model;
+use turnlight::texture::{self, Model};
 use turnlight::{Error, geometry};
 
 pub(crate) fn run(args: &InfoArgs, observer: &dyn Observer) -> Result<Answer, Error> {
@@ -21,7 +21,7 @@ pub(crate) fn run(args: &InfoArgs, observer: &dyn Observer) -> Result<Answer, Er
 }
 
 fn mesh(path: &Path) -> Result<Answer, Error> {
-    let facts: MeshFacts = inspect::mesh_facts(&geometry::read_mesh(path)?.mesh);
+    let facts: MeshFacts = inspect::mesh_facts(&geometry::read_mesh(path)?.mesh)?;
     Ok(Answer { text: facts.text(), json: json!(facts) })
 }
 
@@ -39,7 +39,7 @@ fn glb(path: &Path) -> Result<Answer, Error> {
     }
 }
 
-const EXTENSION: &[u8] = turnlight::texture::EXTENSION.as_bytes();
+const EXTENSION: &[u8] = texture::EXTENSION.as_bytes();
 
 fn capture(args: &InfoArgs, observer: &dyn Observer) -> Result<Answer, Error> {
     let (format, _) = detect_format(&args.path)?;

@@ -30,12 +30,7 @@ impl From<MethodArg> for Method {
 
 impl ShapeArgs {
     fn options(&self) -> ShapeOptions {
-        ShapeOptions {
-            resolution: self.resolution.0,
-            consensus: self.consensus.0,
-            grow_px: self.grow.0,
-            mesh: None,
-        }
+        ShapeOptions { resolution: self.resolution.0, consensus: self.consensus.0, grow_px: self.grow.0, mesh: None }
     }
 }
 

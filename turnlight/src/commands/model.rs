@@ -12,8 +12,7 @@ pub(crate) fn run(args: &ModelArgs, observer: &dyn Observer) -> Result<Answer, E
     let mut stages = Stages::new(observer);
     let (capture, views) = args.capture.load(&args.views, &mut stages)?;
     let (shape, fit) = (args.mesh.options(), args.fit.options());
-    let (model, report) =
-        pipeline::model(&views, capture.aabb, args.method.into(), &shape, &fit, &mut stages)?;
+    let (model, report) = pipeline::model(&views, capture.aabb, args.method.into(), &shape, &fit, &mut stages)?;
     stages.run("write", |_| output::write_file(&args.output, &model.to_glb()?))?;
     let facts = inspect::model_facts(&model)?;
     let unseen = 100.0 * report.unseen_texels as f64 / report.texels.max(1) as f64;

@@ -26,9 +26,8 @@ pub(crate) fn run(args: &RenderArgs, observer: &dyn Observer) -> Result<Answer, 
         super::check_extension(video, &["png", "apng"])?;
     }
     let mut stages = Stages::new(observer);
-    let model = stages.run("read", |_| -> Result<Model, Error> {
-        Ok(Model::from_glb(&read_file(&args.model)?, &args.model)?)
-    })?;
+    let model = stages
+        .run("read", |_| -> Result<Model, Error> { Ok(Model::from_glb(&read_file(&args.model)?, &args.model)?) })?;
     let cameras = cameras(args, &model)?;
     let folder = args.output.as_deref().map(OutputFolder::create).transpose()?;
     let mut times_ms = Vec::with_capacity(cameras.len());

@@ -22,7 +22,8 @@ pub(crate) fn run(args: &SynthArgs, observer: &dyn Observer) -> Result<Answer, E
         let frames: Vec<_> = filmed.views.iter().map(|v| v.image.map(|[r, g, b]| [r, g, b, 255])).collect();
         stages.run("write film", |_| write_film(video, frames, FPS))?;
     }
-    let mut text = format!("{}: {} views of {width} × {height}\nwrote {}", scene.name(), args.views, args.output.display());
+    let mut text =
+        format!("{}: {} views of {width} × {height}\nwrote {}", scene.name(), args.views, args.output.display());
     if let Some(video) = &args.video {
         text.push_str(&format!("\nwrote {}", video.display()));
     }

@@ -79,8 +79,7 @@ pub(super) fn difference(a: &Image<[u8; 3]>, b: &Image<[u8; 3]>) -> Image<[u8; 3
 fn png(image: &Image<[u8; 3]>) -> Result<Vec<u8>, Error> {
     let encode = || -> Result<Vec<u8>, Box<dyn std::error::Error>> {
         let mut bytes = Vec::new();
-        let mut encoder =
-            png::Encoder::new(&mut bytes, u32::try_from(image.width())?, u32::try_from(image.height())?);
+        let mut encoder = png::Encoder::new(&mut bytes, u32::try_from(image.width())?, u32::try_from(image.height())?);
         encoder.set_color(png::ColorType::Rgb);
         let mut writer = encoder.write_header()?;
         writer.write_image_data(image.pixels().as_flattened())?;

@@ -125,12 +125,7 @@ struct Judged {
 }
 
 /// Test positions a training view gives away go to the second list.
-fn without_leaks(
-    capture: &Capture,
-    mesh: &TexturedMesh,
-    train: &[usize],
-    test: &[usize],
-) -> (Vec<usize>, Vec<usize>) {
+fn without_leaks(capture: &Capture, mesh: &TexturedMesh, train: &[usize], test: &[usize]) -> (Vec<usize>, Vec<usize>) {
     let center = mesh.mesh.aabb().map_or_else(Point3::origin, |aabb| aabb.center());
     let direction = |i: usize| (capture.frames[i].camera.center() - center).try_normalize(0.0).unwrap_or_default();
     let is_new = |i: &usize| {

@@ -2,8 +2,8 @@
 
 use super::crops::{self, Cut, DIFFERENCE_GAIN};
 use super::{Comparison, plot, table, view_path};
-use crate::output::OutputFolder;
 use crate::Error;
+use crate::output::OutputFolder;
 use std::fmt::Write;
 
 const STYLE: &str = "body{font:15px/1.5 system-ui,sans-serif;margin:2em auto;max-width:1500px;padding:0 1em}\
@@ -69,12 +69,7 @@ fn shown_views(comparison: &Comparison) -> Vec<usize> {
     shown
 }
 
-fn push_crops(
-    page: &mut String,
-    comparison: &Comparison,
-    position: usize,
-    report: &OutputFolder,
-) -> Result<(), Error> {
+fn push_crops(page: &mut String, comparison: &Comparison, position: usize, report: &OutputFolder) -> Result<(), Error> {
     let file = |kind: &str| report.path().join(view_path(kind, position));
     let mask = capture::read_matte(&file("mask"))?;
     let reference = crops::masked(&capture::read_rgb(&file("reference"))?, &mask);
@@ -96,9 +91,7 @@ fn push_crops(
 }
 
 fn push_picture(page: &mut String, uri: &str, caption: &str) {
-    page.push_str(&format!(
-        "<figure><img src=\"{uri}\" alt=\"{caption}\"><figcaption>{caption}</figcaption></figure>"
-    ));
+    page.push_str(&format!("<figure><img src=\"{uri}\" alt=\"{caption}\"><figcaption>{caption}</figcaption></figure>"));
 }
 
 fn escaped(text: &str) -> String {
