@@ -54,9 +54,8 @@ struct Pixel {
 pub(crate) fn expose(camera: &Camera, exposure: &Exposure<'_>) -> Picture {
     let (width, height) = (camera.intrinsics.width, camera.intrinsics.height);
     let lens = Lens::new(camera);
-    let corner_row = |y: usize| -> Vec<bool> {
-        (0..=width).map(|x| exposure.is_covered(&lens, x as f64, y as f64)).collect()
-    };
+    let corner_row =
+        |y: usize| -> Vec<bool> { (0..=width).map(|x| exposure.is_covered(&lens, x as f64, y as f64)).collect() };
     let corners: Vec<Vec<bool>> = (0..=height).into_par_iter().map(corner_row).collect();
     let row = |y: usize| -> Vec<Pixel> {
         let touched = |x: usize| [corners[y][x], corners[y][x + 1], corners[y + 1][x], corners[y + 1][x + 1]];
@@ -98,14 +97,17 @@ impl Lens {
     fn new(camera: &Camera) -> Self {
         let i = camera.intrinsics;
         let plane_from_pixel = Matrix3::new(
-            1.0 / i.fx, 0.0, -i.cx / i.fx, //
-            0.0, 1.0 / i.fy, -i.cy / i.fy, //
-            0.0, 0.0, 1.0,
+            1.0 / i.fx,
+            0.0,
+            -i.cx / i.fx, //
+            0.0,
+            1.0 / i.fy,
+            -i.cy / i.fy, //
+            0.0,
+            0.0,
+            1.0,
         );
-        Self {
-            origin: camera.center().coords.cast(),
-            world_from_pixel: camera.rotation.transpose() * plane_from_pixel,
-        }
+        Self { origin: camera.center().coords.cast(), world_from_pixel: camera.rotation.transpose() * plane_from_pixel }
     }
 
     fn ray(&self, pixel: Point2<f64>) -> Vec3 {
@@ -159,7 +161,13 @@ impl Exposure<'_> {
     }
 
     /// Mean radiance over samples, times coverage; the noise from two independent halves.
-    fn shade(&self, lens: &Lens, seed: u32, share: f32, mut place: impl FnMut(&mut Sampler, u32) -> Point2<f64>) -> Pixel {
+    fn shade(
+        &self,
+        lens: &Lens,
+        seed: u32,
+        share: f32,
+        mut place: impl FnMut(&mut Sampler, u32) -> Point2<f64>,
+    ) -> Pixel {
         let mut halves = [Vec3::zeros(); 2];
         let (mut met, mut rays) = ([0_u32; 2], 0);
         for i in 0..self.samples {

@@ -104,9 +104,7 @@ impl MeshBuilder {
 
     fn closest(&self, outer: &[u32], inner: &[u32]) -> Option<(usize, usize)> {
         let pairs = (0..outer.len()).flat_map(|o| (0..inner.len()).map(move |i| (o, i)));
-        pairs.min_by(|a, b| {
-            self.distance(outer[a.0], inner[a.1]).total_cmp(&self.distance(outer[b.0], inner[b.1]))
-        })
+        pairs.min_by(|a, b| self.distance(outer[a.0], inner[a.1]).total_cmp(&self.distance(outer[b.0], inner[b.1])))
     }
 
     fn distance(&self, a: u32, b: u32) -> f64 {

@@ -9,7 +9,8 @@ pub(crate) fn noise(p: Vec3, seed: u32) -> f32 {
     let cell = p.map(f32::floor);
     let f = (p - cell).map(smoothstep);
     let at = |dx: i32, dy: i32, dz: i32| {
-        let [x, y, z] = [(cell.x as i32).wrapping_add(dx), (cell.y as i32).wrapping_add(dy), (cell.z as i32).wrapping_add(dz)];
+        let [x, y, z] =
+            [(cell.x as i32).wrapping_add(dx), (cell.y as i32).wrapping_add(dy), (cell.z as i32).wrapping_add(dz)];
         unit(mix(mix(mix(x as u32 ^ seed) ^ y as u32) ^ z as u32))
     };
     let along_x = |dy, dz| lerp(at(0, dy, dz), at(1, dy, dz), f.x);

@@ -238,13 +238,7 @@ mod tests {
     fn plane_under_a_parallel_disk_light() {
         // On the axis E = π L r² / (r² + h²); seen radiance is albedo E / π.
         let (r, h, albedo, l) = (1.5, 2.0, 0.6, 3.0);
-        let light = AreaLight::facing(
-            LightShape::Disk,
-            Vec3::new(0.0, 0.0, h),
-            Vec3::zeros(),
-            [r, r],
-            Vec3::repeat(l),
-        );
+        let light = AreaLight::facing(LightShape::Disk, Vec3::new(0.0, 0.0, h), Vec3::zeros(), [r, r], Vec3::repeat(l));
         let rig = LightRig { sky: Sky::uniform(0.0), lights: vec![light] };
         let direction = Vec3::new(0.6, 0.0, -0.8);
         let (mean, error) = measure(&world(&plane(), albedo, None), -direction, direction, &rig, 100_000);
@@ -264,8 +258,7 @@ mod tests {
             radiance: Vec3::repeat(2.0),
         };
         let rig = LightRig { sky: Sky::uniform(0.0), lights: vec![light] };
-        let (mean, error) =
-            measure(&world(&plane(), 1.0, None), Vec3::new(0.0, 0.0, 1.0), -Vec3::z(), &rig, 100_000);
+        let (mean, error) = measure(&world(&plane(), 1.0, None), Vec3::new(0.0, 0.0, 1.0), -Vec3::z(), &rig, 100_000);
         let (x, y) = (a / h, b / h);
         let half = |x: f64, y: f64| x / (1.0 + x * x).sqrt() * (y / (1.0 + x * x).sqrt()).atan();
         let expected = 2.0 / 2.0 * (half(x, y) + half(y, x)) / PI;

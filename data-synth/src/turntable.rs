@@ -68,8 +68,10 @@ pub(crate) fn stations(layout: &Layout, views: usize, seed: u64) -> Result<Vec<S
         Layout::Hemisphere { above_deg } => {
             let low = elevation(*above_deg)?.sin();
             let high = MAX_ELEVATION_DEG.to_radians().sin();
-            let uniform = |i: usize, k: u64| (splitmix(seed ^ splitmix(2 * i as u64 + k)) >> 11) as f64 / (1_u64 << 53) as f64;
-            let at = |i| Station { azimuth: TAU * uniform(i, 0), elevation: (low + (high - low) * uniform(i, 1)).asin() };
+            let uniform =
+                |i: usize, k: u64| (splitmix(seed ^ splitmix(2 * i as u64 + k)) >> 11) as f64 / (1_u64 << 53) as f64;
+            let at =
+                |i| Station { azimuth: TAU * uniform(i, 0), elevation: (low + (high - low) * uniform(i, 1)).asin() };
             Ok((0..views).map(at).collect())
         }
     }
@@ -86,8 +88,7 @@ fn rings(elevations_deg: &[f64], views: usize) -> Result<Vec<Station>, SynthErro
         // Ring sizes differ by one at most.
         let count = (ring + 1) * views / n - ring * views / n;
         let offset = if ring % 2 == 1 { 0.5 } else { 0.0 };
-        stations
-            .extend((0..count).map(|i| Station { azimuth: TAU * (i as f64 + offset) / count as f64, elevation }));
+        stations.extend((0..count).map(|i| Station { azimuth: TAU * (i as f64 + offset) / count as f64, elevation }));
     }
     Ok(stations)
 }

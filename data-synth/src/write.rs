@@ -25,7 +25,8 @@ impl SynthCapture {
         let parent = dir.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
         fs::create_dir_all(parent).map_err(io_error(parent))?;
         // Beside the target, so that the rename stays on one file system; gone if we fail.
-        let staging = tempfile::Builder::new().prefix(".turnlight-synth-").tempdir_in(parent).map_err(io_error(parent))?;
+        let staging =
+            tempfile::Builder::new().prefix(".turnlight-synth-").tempdir_in(parent).map_err(io_error(parent))?;
         let inner = staging.path().join("capture");
         self.write_all(&inner)?;
         if dir.is_dir() {
@@ -162,8 +163,7 @@ mod tests {
     use nalgebra::{Point3, Vector4};
 
     fn small() -> SynthCapture {
-        let options =
-            SynthOptions { views: 2, width: 32, height: 24, samples_per_pixel: 1, ..SynthOptions::default() };
+        let options = SynthOptions { views: 2, width: 32, height: 24, samples_per_pixel: 1, ..SynthOptions::default() };
         synthesize(Scene::Temple, &options).unwrap()
     }
 

@@ -2,12 +2,20 @@
 //!
 //! This crate knows shapes and cameras, and no colour, no appearance and no GPU.
 
+pub mod atlas;
 pub mod depth;
 mod error;
 pub mod hull;
 pub mod mesh;
+mod param;
+mod segment;
+mod simplify;
 
+pub use atlas::{UnwrapOptions, UnwrapReport, Unwrapped, unwrap_mesh};
 pub use depth::DepthMap;
 pub use error::GeometryError;
 pub use hull::{Hull, HullOptions, HullReport, visual_hull};
-pub use mesh::{Mesh, MeshCheck, TexturedMesh};
+pub use mesh::{Mesh, MeshCheck, TexturedMesh, taubin_smooth};
+pub use param::FlatteningLimits;
+pub use segment::SegmentOptions;
+pub use simplify::{Simplified, SimplifyOptions, simplify};

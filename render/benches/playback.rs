@@ -30,11 +30,12 @@ fn scene(shape: &str, width: usize, height: usize, supersample: usize) -> Scene 
     Scene { mesh, atlas: support::atlas(1024, 1024), camera, options: RenderOptions { supersample, background: None } }
 }
 
-const FRAMES: [(&str, usize, usize, usize); 5] = [
+const FRAMES: [(&str, usize, usize, usize); 6] = [
     ("sphere", 640, 480, 2),
     ("torus", 640, 480, 2),
     ("knot", 640, 480, 2),
     ("sphere", 800, 600, 1),
+    ("torus", 800, 600, 1),
     ("knot", 800, 600, 1),
 ];
 

@@ -14,7 +14,7 @@
 //!
 //! State: the lens enters exactly where a ray goes, but its local magnification is left out of the
 //! mip level; filtering is isotropic, so surfaces at grazing angles blur along the far direction;
-//! frames beyond [`MAX_PIXELS`] come back empty.
+//! frames beyond [`MAX_PIXELS`] come back empty; of two faces at the very same depth either may show.
 
 pub mod cpu;
 mod error;

@@ -4,8 +4,10 @@ use capture::{Aabb, Camera, Distortion, Intrinsics};
 use nalgebra::{Matrix3, Point3, Rotation3, Unit, Vector3};
 use std::f64::consts::TAU;
 
-/// How much of the frame the object's box fills at most, in width and in height.
-const FILL: f64 = 0.8;
+/// How much of the frame the corners of the object's box span at most, in width and in height. A round
+/// object then fills two thirds of it and a box-shaped one nearly all: 80 % or so for what lies between,
+/// and nothing is ever cut off.
+const FILL: f64 = 0.95;
 
 /// Without a camera to go by: elevation of the eye above the turntable.
 const ELEVATION: f64 = 20.0 / 180.0 * std::f64::consts::PI;
@@ -14,7 +16,8 @@ const ELEVATION: f64 = 20.0 / 180.0 * std::f64::consts::PI;
 const FOCAL_PER_HEIGHT: f64 = 1.373_738_709_727_3;
 
 /// `n` pinhole cameras of `width × height` pixels in even steps around the centre of `aabb` about `up`,
-/// counter-clockwise seen from above, all at the distance where the box fills at most 80 % of the frame.
+/// counter-clockwise seen from above, all at the distance where the box just fits with a margin, so that
+/// what is in it fills some 80 % of the frame.
 ///
 /// `like` gives the field of view, the elevation and the first azimuth; its lens distortion is left
 /// behind. Without it: 40° vertically, 20° up. A degenerate box, `up` or `like` gives way to a unit

@@ -23,6 +23,7 @@ pub(crate) struct Accumulator {
 
 impl Accumulator {
     /// Adds the colour of a covered sub-sample.
+    #[inline]
     pub(crate) fn add(&mut self, colour: [f32; 3]) {
         for c in 0..3 {
             self.sum[c] += colour[c];
@@ -31,14 +32,18 @@ impl Accumulator {
     }
 
     /// The pixel out of `samples` sub-samples; the only place where anything is clamped or rounded.
+    #[inline]
     pub(crate) fn finish(&self, samples: usize, background: Option<[u8; 3]>) -> [u8; 4] {
         let Some(background) = background else {
             return self.transparent(samples);
         };
         let open = (samples - self.covered.min(samples)) as f32;
         let scale = 1.0 / samples as f32;
-        let [r, g, b] = [0, 1, 2].map(|c| to_u8((self.sum[c] + open * f32::from(background[c])) * scale));
-        [r, g, b, 255]
+        let mut pixel = [255; 4];
+        for c in 0..3 {
+            pixel[c] = to_u8((self.sum[c] + open * f32::from(background[c])) * scale);
+        }
+        pixel
     }
 
     fn transparent(&self, samples: usize) -> [u8; 4] {
@@ -46,8 +51,9 @@ impl Accumulator {
             return [0; 4];
         }
         let scale = 1.0 / self.covered as f32;
-        let [r, g, b] = self.sum.map(|s| to_u8(s * scale));
-        [r, g, b, to_u8(255.0 * self.covered as f32 / samples as f32)]
+        let [r, g, b] = self.sum;
+        let alpha = 255.0 * self.covered as f32 / samples as f32;
+        [to_u8(r * scale), to_u8(g * scale), to_u8(b * scale), to_u8(alpha)]
     }
 }
 

@@ -110,6 +110,19 @@ fn eye_inside_the_mesh() {
     assert_parity("floor", &floor, &atlas, &camera, &at(2));
 }
 
+/// The harness itself: a picture that is off in one texel of every hundred must not pass.
+#[test]
+fn a_wrong_picture_is_found() {
+    let (mesh, atlas) = (torus(40, 16), atlas(128, 128));
+    let camera = look_at(Point3::new(2.5, 1.0, 1.5), Point3::origin(), 120.0, 80, 60);
+    let right = cpu::render(&mesh, &atlas, &camera, &at(2));
+    let mut wrong = right.clone();
+    wrong.pixels_mut().iter_mut().step_by(100).for_each(|p| p[1] = p[1].wrapping_add(2));
+    assert_eq!(difference(&right, &right).inner_off, 0);
+    let d = difference(&right, &wrong);
+    assert!(d.inner_off * 1000 > d.inner, "{d:?}");
+}
+
 /// A quad that fills the frame with one texel per pixel: pixel centres meet texel centres.
 #[test]
 fn one_to_one_is_the_identity() {
@@ -141,6 +154,24 @@ fn grid_aligned_edges_leave_no_holes() {
             assert_eq!(frame.at(x, y)[3], 255, "hole at {x}, {y}");
         }
     }
+}
+
+/// Writes a picture to look at: `TURNLIGHT_LOOK=DIR cargo test -p render look`.
+#[test]
+fn a_film_of_a_knot() {
+    let (mesh, atlas) = (knot(400, 20), atlas(1024, 1024));
+    let aabb = mesh.mesh.aabb().unwrap();
+    let cameras = render::path::turntable_cameras(&aabb, None, 4, 320, 240, nalgebra::Vector3::z());
+    let mut player = cpu::Player::new(&mesh, at(2));
+    let frames: Vec<_> = cameras.iter().map(|camera| player.render(&atlas, camera)).collect();
+    for frame in &frames {
+        assert!(frame.at(0, 0)[3] == 0 && frame.pixels().iter().filter(|p| p[3] == 255).count() > 5_000);
+    }
+    let kept = std::env::var_os("TURNLIGHT_LOOK").map(std::path::PathBuf::from);
+    let folder = tempfile::tempdir().unwrap();
+    let folder = kept.as_deref().unwrap_or(folder.path());
+    render::film::write_png(&folder.join("knot.png"), &frames[0]).unwrap();
+    render::film::write_film(&folder.join("knot.apng"), frames, 10.0).unwrap();
 }
 
 #[test]

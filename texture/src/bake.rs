@@ -71,15 +71,15 @@ impl<'a> Bake<'a> {
     pub(crate) fn paint(&self, values: &[Vec<[f32; 3]>], known: &[Vec<bool>]) -> Image<[f32; 3]> {
         let [width, height] = self.surface.size;
         let mut image = Image::filled(width, height, [0.0f32; 3]);
-        let mut mask = Image::filled(width, height, false);
+        let mut mask = vec![false; width * height];
         for ((texels, values), known) in self.facets.texels.iter().zip(values).zip(known) {
             for ((&t, value), _) in texels.iter().zip(values).zip(known).filter(|(_, known)| **known) {
                 let at = self.surface.index[t as usize] as usize;
                 image.pixels_mut()[at] = *value;
-                mask.pixels_mut()[at] = true;
+                mask[at] = true;
             }
         }
-        PushPull::new(&mask).fill(&mut image);
+        PushPull::new([width, height], &mask).apply(image.pixels_mut().as_flattened_mut(), 3);
         image
     }
 

@@ -22,7 +22,7 @@ pub struct Facets {
 }
 
 /// Cuts every chart into compact facets of about `target` texels. Deterministic.
-pub fn partition(mesh: &TexturedMesh, surface: &SurfaceTexels, target: usize) -> Facets {
+pub(crate) fn partition(mesh: &TexturedMesh, surface: &SurfaceTexels, target: usize) -> Facets {
     let mut per_face = vec![0u32; mesh.mesh.faces.len()];
     surface.faces.iter().for_each(|&f| per_face[f as usize] += 1);
     let charts = mesh.face_charts.iter().max().map_or(0, |&c| c as usize + 1);

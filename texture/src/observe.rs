@@ -30,7 +30,7 @@ const STEEPEST: f64 = 6.0;
 
 /// One photograph ready to be asked about texels.
 #[derive(Debug)]
-pub struct Observer<'a> {
+pub(crate) struct Observer<'a> {
     view: &'a View,
     projection: Matrix3x4<f64>,
     center: Point3<f64>,
@@ -44,39 +44,39 @@ pub struct Observer<'a> {
 
 /// A texel as one photograph shows it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Observation {
+pub(crate) struct Observation {
     /// Trust in [0, 1]; 0 = not seen.
-    pub weight: f32,
+    pub(crate) weight: f32,
     /// Encoded intensities 0..=255.
-    pub color: [f32; 3],
+    pub(crate) color: [f32; 3],
 }
 
 impl<'a> Observer<'a> {
     /// Prepares `view` for a proxy; `mask_erode_px` is taken off its silhouette first.
-    pub fn new(view: &'a View, mesh: &Mesh, mask_erode_px: f64) -> Self {
+    pub(crate) fn new(view: &'a View, mesh: &Mesh, mask_erode_px: f64) -> Self {
         let depth = DepthMap::render(mesh, &view.camera);
         Self {
             view,
             projection: view.camera.projection_matrix(),
             center: view.camera.center(),
-            nearest_depth: minimum_3x3(&depth),
+            nearest_depth: minimum_3x3(&depth.depth),
             usable: capture::erode(&view.matte, mask_erode_px),
             slack: DEPTH_SLACK * mesh.aabb().map_or(0.0, |b| b.diagonal()),
         }
     }
 
     /// All views of a capture, prepared in parallel.
-    pub fn prepare(views: &'a [View], mesh: &Mesh, mask_erode_px: f64) -> Vec<Self> {
+    pub(crate) fn prepare(views: &'a [View], mesh: &Mesh, mask_erode_px: f64) -> Vec<Self> {
         views.par_iter().map(|view| Self::new(view, mesh, mask_erode_px)).collect()
     }
 
     /// Where the photograph was taken from.
-    pub fn center(&self) -> Point3<f64> {
+    pub(crate) fn center(&self) -> Point3<f64> {
         self.center
     }
 
     /// What the photograph says about a surface point.
-    pub fn observe(&self, point: &Point3<f64>, normal: &Vector3<f64>) -> Observation {
+    pub(crate) fn observe(&self, point: &Point3<f64>, normal: &Vector3<f64>) -> Observation {
         let to_camera = self.center - point;
         let distance = to_camera.norm();
         let cosine = normal.dot(&to_camera) / distance;
@@ -115,16 +115,16 @@ impl<'a> Observer<'a> {
 
 /// Observations of some texels in all views: one row of `views` entries per texel.
 #[derive(Debug)]
-pub struct Samples {
+pub(crate) struct Samples {
     /// How many views a row holds.
-    pub views: usize,
+    pub(crate) views: usize,
     /// Row-major, texel by texel.
-    pub rows: Vec<Observation>,
+    pub(crate) rows: Vec<Observation>,
 }
 
 impl Samples {
     /// Asks every observer about every one of `texels`.
-    pub fn gather(observers: &[Observer<'_>], surface: &SurfaceTexels, texels: &[u32]) -> Self {
+    pub(crate) fn gather(observers: &[Observer<'_>], surface: &SurfaceTexels, texels: &[u32]) -> Self {
         let views = observers.len();
         let mut rows = vec![Observation::default(); texels.len() * views];
         for (row, &t) in rows.chunks_exact_mut(views.max(1)).zip(texels) {
@@ -135,7 +135,7 @@ impl Samples {
     }
 
     /// The observations of the texel in row `i`.
-    pub fn row(&self, i: usize) -> &[Observation] {
+    pub(crate) fn row(&self, i: usize) -> &[Observation] {
         &self.rows[i * self.views..(i + 1) * self.views]
     }
 }
@@ -146,7 +146,7 @@ fn smoothstep([low, high]: [f64; 2], x: f64) -> f64 {
     t * t * (3.0 - 2.0 * t)
 }
 
-fn minimum_3x3(depth: &DepthMap) -> Image<f32> {
+fn minimum_3x3(depth: &Image<f32>) -> Image<f32> {
     let (w, h) = (depth.width(), depth.height());
     let mut out = Image::filled(w, h, f32::INFINITY);
     for y in 0..h {

@@ -1,7 +1,7 @@
 //! The surface behind every texel of the atlas.
 
 use geometry::TexturedMesh;
-use geometry::atlas::AtlasTexels;
+use geometry::atlas::rasterize;
 use nalgebra::{Point3, Vector3};
 
 /// One entry per texel that carries surface, in row-major order of the atlas.
@@ -22,9 +22,15 @@ pub struct SurfaceTexels {
 impl SurfaceTexels {
     /// Bakes the surface of `mesh` into its atlas.
     pub fn bake(mesh: &TexturedMesh) -> Self {
-        let _ = AtlasTexels::rasterize;
-        let _ = mesh;
-        unimplemented!()
+        let atlas = rasterize(mesh);
+        let width = atlas.size[0] as u32;
+        Self {
+            size: atlas.size,
+            index: atlas.texels.iter().map(|t| t.y * width + t.x).collect(),
+            faces: atlas.texels.iter().map(|t| t.face).collect(),
+            positions: atlas.positions(mesh),
+            normals: atlas.normals(mesh),
+        }
     }
 
     /// Texels that carry surface.

@@ -43,7 +43,11 @@ pub(crate) fn build() -> MeshBuilder {
 fn distances(p: P) -> [f64; 4] {
     // The figure is its own mirror image but for the tail, which lies in the plane of symmetry.
     let q = P::new(p.x, p.y.abs(), p.z);
-    let tusk = chain(q, &[(0.60, 0.10, 0.62, 0.040), (0.72, 0.135, 0.51, 0.033), (0.84, 0.13, 0.48, 0.025), (0.93, 0.11, 0.53, 0.017)], 0.01);
+    let tusk = chain(
+        q,
+        &[(0.60, 0.10, 0.62, 0.040), (0.72, 0.135, 0.51, 0.033), (0.84, 0.13, 0.48, 0.025), (0.93, 0.11, 0.53, 0.017)],
+        0.01,
+    );
     let eye = (q - P::new(0.652, 0.118, 0.80)).norm() - 0.026;
     let ear = ear(q);
     let body = smooth_min(body(q), ear, 0.035);
@@ -213,21 +217,32 @@ fn cloth(q: Vec3, under: Vec3, gold: Vec3) -> Vec3 {
     let v = q.y.atan2(q.z - 0.58) * 0.30;
     let (half_u, half_v) = (0.225, 0.47);
     let edge = (u.abs() - half_u).max(v.abs() - half_v);
-    let fringe = stripe(v.abs() - half_v - 0.02, 0.022, 0.004) * stripe(u, half_u, 0.004) * stripe(wrap(u, 0.018), 0.0055, 0.003);
+    let fringe = stripe(v.abs() - half_v - 0.02, 0.022, 0.004)
+        * stripe(u, half_u, 0.004)
+        * stripe(wrap(u, 0.018), 0.0055, 0.003);
     let mut c = blend(under, gold, fringe);
     if edge > 0.01 {
         return c;
     }
     let (du, dv) = (wrap(u, 0.115), wrap(v, 0.115));
     let flower = (du * du + dv * dv).sqrt() + 0.010 * (6.0 * dv.atan2(du)).cos();
-    let lattice = stripe(wrap(u + v, 0.115) - 0.0575 * 0.0, 0.0, 0.004).max(stripe((du.abs() + dv.abs()) - 0.0575, 0.004, 0.004));
+    let lattice =
+        stripe(wrap(u + v, 0.115) - 0.0575 * 0.0, 0.0, 0.004).max(stripe((du.abs() + dv.abs()) - 0.0575, 0.004, 0.004));
     let mut field = blend(color([142, 20, 34]), color([172, 34, 44]), noise(q * 40.0, 61));
     field = blend(field, gold, lattice);
     field = blend(field, color([238, 222, 190]), 1.0 - step(0.030, 0.005, flower));
     field = blend(field, color([28, 58, 120]), 1.0 - step(0.014, 0.005, flower));
     let border = blend(color([24, 46, 104]), color([236, 220, 186]), {
         let (bu, bv) = (wrap(u, 0.045), wrap(v, 0.047));
-        1.0 - step(0.011, 0.004, if u.abs() - half_u > v.abs() - half_v { bv.hypot(u.abs() - half_u + 0.034) } else { bu.hypot(v.abs() - half_v + 0.034) })
+        1.0 - step(
+            0.011,
+            0.004,
+            if u.abs() - half_u > v.abs() - half_v {
+                bv.hypot(u.abs() - half_u + 0.034)
+            } else {
+                bu.hypot(v.abs() - half_v + 0.034)
+            },
+        )
     });
     let inside = blend(field, border, step(-0.058, 0.003, edge));
     let cord = stripe(edge + 0.006, 0.006, 0.003).max(stripe(edge + 0.060, 0.005, 0.003));

@@ -209,7 +209,11 @@ pub(crate) fn albedo(p: Vec3, normal: Vec3, part: u8) -> Vec3 {
         ENTABLATURE => frieze(p, normal),
         ROOF => tiles(p),
         TYMPANUM => blend(color([150, 62, 48]), stone(p), 0.25 + 0.5 * fractal(p * 160.0, 4, 31)),
-        DOOR => blend(color([58, 42, 32]), color([92, 66, 44]), fractal(p.component_mul(&Vec3::new(900.0, 900.0, 60.0)), 3, 3)),
+        DOOR => blend(
+            color([58, 42, 32]),
+            color([92, 66, 44]),
+            fractal(p.component_mul(&Vec3::new(900.0, 900.0, 60.0)), 3, 3),
+        ),
         CELLA => blocks(p, normal, [0.022, 0.0105]),
         _ => blocks(p, normal, [0.026, 0.005]),
     };
@@ -240,8 +244,7 @@ fn blocks(p: Vec3, normal: Vec3, size: [f32; 2]) -> Vec3 {
     let shifted = along + 0.5 * size[0] * course.rem_euclid(2.0);
     let block = (shifted / size[0]).floor();
     let shade = 0.86 + 0.14 * noise(Vec3::new(block * 7.3, course * 5.1, 0.5), 41);
-    let joint = stripe(wrap(shifted, size[0]), 0.0002, 0.0003)
-        .max(stripe(wrap(p.z - 0.015, size[1]), 0.0002, 0.0003));
+    let joint = stripe(wrap(shifted, size[0]), 0.0002, 0.0003).max(stripe(wrap(p.z - 0.015, size[1]), 0.0002, 0.0003));
     stone(p) * shade * (1.0 - 0.45 * joint)
 }
 

@@ -1,8 +1,11 @@
 //! Indexed triangle meshes. Triangles are counter-clockwise seen from outside.
 
 mod check;
+pub mod half_edge;
+mod smooth;
 
 pub use check::MeshCheck;
+pub use smooth::{TaubinOptions, taubin_smooth};
 
 use capture::Aabb;
 use nalgebra::{Point2, Point3, Vector3};

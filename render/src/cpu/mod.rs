@@ -16,6 +16,7 @@
 //! A lens is exact: sub-samples are carried to the ideal plane once per camera model (microseconds
 //! each, so a second for the first frame; a [`Player`] keeps them) and faces are tested there.
 
+mod fragments;
 mod samples;
 mod setup;
 mod shade;
@@ -24,10 +25,12 @@ mod visibility;
 use crate::filter::MipChain;
 use crate::{RenderOptions, frame_size, is_usable, resolve};
 use capture::{Camera, Image};
+use fragments::{Fragments, Scene};
 use geometry::TexturedMesh;
 use rayon::prelude::*;
 use samples::Samples;
 use std::time::{Duration, Instant};
+use visibility::Nearest;
 
 /// How long the stages of the last frame took.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -48,6 +51,8 @@ pub struct Player<'a> {
     mesh: &'a TexturedMesh,
     options: RenderOptions,
     samples: Option<Samples>,
+    /// Kept for their memory alone.
+    tiles: Vec<Fragments>,
     times: StageTimes,
 }
 
@@ -64,7 +69,7 @@ pub fn render(
 impl<'a> Player<'a> {
     /// A player of `mesh`.
     pub fn new(mesh: &'a TexturedMesh, options: RenderOptions) -> Self {
-        Self { mesh, options, samples: None, times: StageTimes::default() }
+        Self { mesh, options, samples: None, tiles: Vec::new(), times: StageTimes::default() }
     }
 
     /// How long the stages of the last frame took.
@@ -92,16 +97,17 @@ impl<'a> Player<'a> {
         let faces = setup::faces(self.mesh, camera);
         let bins = samples.bin(&faces);
         let binned = Instant::now();
-        let size = [atlas.width(), atlas.height()];
-        let tiles: Vec<_> = (0..samples.tiles())
-            .into_par_iter()
-            .map(|tile| visibility::tile(samples, tile, bins.of(tile), &faces, self.mesh, size))
-            .collect();
+        let scene = Scene { samples, mesh: self.mesh, faces: &faces, atlas_size: [atlas.width(), atlas.height()] };
+        self.tiles.resize_with(samples.tiles(), Fragments::default);
+        let find = |nearest: &mut Nearest, (tile, fragments): (usize, &mut Fragments)| {
+            fragments.find(&scene, tile, bins.of(tile), nearest);
+        };
+        self.tiles.par_iter_mut().enumerate().for_each_init(Nearest::default, find);
         let seen = Instant::now();
-        let top = tiles.iter().map(visibility::Fragments::top_level).max().unwrap_or(0);
+        let top = self.tiles.iter().map(Fragments::top_level).max().unwrap_or(0);
         let chain = MipChain::build(atlas, top);
         let reduced = Instant::now();
-        shade::frame(&mut frame, samples, &tiles, &chain, self.options.background);
+        shade::frame(&mut frame, samples, &self.tiles, &chain, self.options.background);
         self.times = StageTimes {
             setup: binned - start,
             visibility: seen - binned,

@@ -10,8 +10,8 @@ use std::ops::Range;
 /// Sub-samples along a tile's side: depths and faces of a tile stay in the second-level cache.
 const TILE_SAMPLES: usize = 64;
 
-/// Sub-samples along the side of a block, the unit that is skipped under a lens.
-const BLOCK_SAMPLES: usize = 8;
+/// Sub-samples along the side of a block, the unit of what is skipped.
+pub(super) const BLOCK_SAMPLES: usize = 8;
 
 /// A box on the ideal plane; empty where nothing was put in.
 #[derive(Clone, Copy, Debug)]
@@ -21,7 +21,7 @@ struct Bounds {
 }
 
 /// A rectangle of sub-samples, counted over the frame.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Patch {
     pub(super) columns: Range<usize>,
     pub(super) rows: Range<usize>,

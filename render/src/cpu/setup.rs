@@ -24,6 +24,10 @@ pub(super) struct EdgeFace {
     pub(super) edges: [Linear; 3],
     /// Weights' sum × this = 1 / depth.
     pub(super) inverse_det: f64,
+    /// Largest 1 / depth on the face; infinite where it reaches behind the camera.
+    pub(super) nearest: f64,
+    /// Whether its outside is seen.
+    pub(super) is_front: bool,
     /// Index in the mesh.
     pub(super) face: u32,
     /// Ideal pixels [x, y] that may be covered: lowest.
@@ -56,7 +60,10 @@ fn edge_face(corners: &[Vector3<f64>; 3], intrinsics: &Intrinsics, face: u32) ->
     let inverse_det = 1.0 / det.abs();
     let degenerate = !inverse_det.is_finite() || edges.iter().any(|e| e[0] == 0.0 && e[1] == 0.0 && e[2] <= 0.0);
     let (low, high) = bounds(corners, intrinsics);
-    (!degenerate).then_some(EdgeFace { edges, inverse_det, face, low, high })
+    let nearest = corners.iter().map(|c| if c.z > 0.0 { 1.0 / c.z } else { f64::INFINITY }).fold(0.0, f64::max);
+    // Counter-clockwise from outside: the outward normal points at the eye.
+    let is_front = det < 0.0;
+    (!degenerate).then_some(EdgeFace { edges, inverse_det, nearest, is_front, face, low, high })
 }
 
 /// `n · K⁻¹ (x, y, 1)`. Odd in `n` to the last bit, which makes shared edges watertight.

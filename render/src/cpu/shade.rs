@@ -1,7 +1,7 @@
 //! Texture lookups and the average over each pixel's sub-samples.
 
+use super::fragments::Fragments;
 use super::samples::Samples;
-use super::visibility::Fragments;
 use crate::filter::MipChain;
 use crate::resolve::Accumulator;
 use capture::Image;

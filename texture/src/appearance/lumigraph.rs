@@ -92,14 +92,14 @@ impl Lumigraph {
         let texels: Vec<Option<[f32; 3]>> =
             (0..surface.len()).into_par_iter().map(|t| self.texel(t, &surface.positions[t], eye)).collect();
         let mut image = Image::filled(width, height, [0.0f32; 3]);
-        let mut mask = Image::filled(width, height, false);
+        let mut mask = vec![false; width * height];
         for (&at, color) in surface.index.iter().zip(texels) {
             if let Some(color) = color {
                 image.pixels_mut()[at as usize] = color;
-                mask.pixels_mut()[at as usize] = true;
+                mask[at as usize] = true;
             }
         }
-        PushPull::new(&mask).fill(&mut image);
+        PushPull::new(surface.size, &mask).apply(image.pixels_mut().as_flattened_mut(), 3);
         image
     }
 
@@ -141,7 +141,7 @@ impl Lumigraph {
     /// Mean colour of each texel's rays, for viewers that know no layers.
     pub(crate) fn mean(&self, surface: &SurfaceTexels) -> Image<[f32; 3]> {
         let mut image = Image::filled(surface.size[0], surface.size[1], [0.0f32; 3]);
-        let mut mask = Image::filled(surface.size[0], surface.size[1], false);
+        let mut mask = vec![false; surface.size[0] * surface.size[1]];
         for (t, &at) in surface.index.iter().enumerate() {
             let rays: Vec<[u8; 3]> = (t * self.rays..(t + 1) * self.rays)
                 .filter(|&k| self.views[k] != NO_RAY)
@@ -152,9 +152,9 @@ impl Lumigraph {
             }
             let mean = |c: usize| rays.iter().map(|p| f32::from(p[c])).sum::<f32>() / rays.len() as f32;
             image.pixels_mut()[at as usize] = std::array::from_fn(mean);
-            mask.pixels_mut()[at as usize] = true;
+            mask[at as usize] = true;
         }
-        PushPull::new(&mask).fill(&mut image);
+        PushPull::new(surface.size, &mask).apply(image.pixels_mut().as_flattened_mut(), 3);
         image
     }
 
