@@ -62,14 +62,8 @@ fn build() -> PathBuf {
 /// # Panics
 /// Where it cannot be made.
 pub fn small_capture(folder: &Path, views: usize) -> PathBuf {
-    let options = SynthOptions {
-        views,
-        width: 96,
-        height: 72,
-        samples_per_pixel: 2,
-        surfaces: 1,
-        ..SynthOptions::default()
-    };
+    let options =
+        SynthOptions { views, width: 96, height: 72, samples_per_pixel: 2, surfaces: 1, ..SynthOptions::default() };
     let path = folder.join("capture");
     let filmed = synthesize(Scene::Temple, &options).unwrap_or_else(|e| panic!("{e}"));
     filmed.write(&path).unwrap_or_else(|e| panic!("{e}"));

@@ -176,7 +176,8 @@ fn outside_the_frame() {
 
 #[test]
 fn every_row_has_its_test() {
-    let page = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/conventions.md")).expect("the page");
+    let page =
+        std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/conventions.md")).expect("the page");
     let source = include_str!("conventions.rs");
     let rows: Vec<&str> = page.lines().filter_map(|l| l.strip_prefix("| `")?.split('`').next()).collect();
     assert!(rows.len() >= 11);

@@ -25,7 +25,8 @@ fn dependencies(manifest: &str) -> Vec<String> {
         if let Some(table) = line.strip_prefix('[').and_then(|rest| rest.strip_suffix(']')) {
             in_dependencies = table.ends_with("dependencies");
             // [dependencies.name] is a dependency of its own.
-            if let Some((parent, name)) = table.rsplit_once('.').filter(|(parent, _)| parent.ends_with("dependencies")) {
+            if let Some((parent, name)) = table.rsplit_once('.').filter(|(parent, _)| parent.ends_with("dependencies"))
+            {
                 assert!(!parent.is_empty());
                 names.push(name.to_owned());
             }

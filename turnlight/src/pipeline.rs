@@ -3,7 +3,7 @@
 use crate::Error;
 use crate::stages::Stages;
 use capture::{Aabb, View};
-use geometry::hull::{HullOptions, visual_hull};
+use geometry::hull::{HullOptions, choose_hull, visual_hull};
 use geometry::{Mesh, SimplifyOptions, TexturedMesh, UnwrapOptions, unwrap_mesh};
 use nalgebra::Point3;
 use std::path::{Path, PathBuf};
@@ -68,14 +68,17 @@ pub fn hull(
     options: &ShapeOptions,
     stages: &mut Stages<'_>,
 ) -> Result<Mesh, Error> {
-    let hull_options = HullOptions {
-        resolution: options.resolution,
-        consensus: options.consensus.unwrap_or(0),
-        grow_px: options.grow_px.unwrap_or(0.0),
-        aabb,
-        ..HullOptions::default()
+    let base = HullOptions { resolution: options.resolution, aabb, ..HullOptions::default() };
+    let chosen = match (options.consensus, options.grow_px) {
+        (Some(consensus), Some(grow_px)) => HullOptions { consensus, grow_px, ..base },
+        (consensus, grow_px) => {
+            let choice = stages.run("choose hull", |_| choose_hull(views, &base))?.options;
+            let (consensus, grow_px) = (consensus.unwrap_or(choice.consensus), grow_px.unwrap_or(choice.grow_px));
+            stages.observer().noted(&format!("hull: {consensus} views forgiven, silhouettes grown by {grow_px} px"));
+            HullOptions { consensus, grow_px, ..choice }
+        }
     };
-    Ok(stages.run("hull", |_| visual_hull(views, &hull_options))?.mesh)
+    Ok(stages.run("hull", |_| visual_hull(views, &chosen))?.mesh)
 }
 
 /// A hull at one to two pixels a cell holds many more triangles than its silhouettes need.
