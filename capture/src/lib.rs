@@ -16,6 +16,7 @@
 mod camera;
 mod capture_set;
 pub mod contour;
+pub mod doctor;
 mod error;
 mod formats;
 mod image;

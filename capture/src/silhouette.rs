@@ -43,8 +43,9 @@ pub fn find_mattes_in_box(images: &[Image<[u8; 3]>], cameras: &[Camera], object_
     let level = learned_level(&scores, cameras, &hull);
     let second: Vec<Image<u8>> = scores.par_iter().map(|score| without_specks(&above(score, level))).collect();
     let hull = vote(cameras, &second, Some(&hull.tight_box)).unwrap_or(hull);
-    let decide =
-        |(score, camera): (&Image<f32>, &Camera)| softened(score, &decided(score, level, camera, &hull), level);
+    let decide = |(score, camera): (&Image<f32>, &Camera)| {
+        softened(score, &decided(score, level, key.fill_level(level), camera, &hull), level)
+    };
     scores.par_iter().zip(cameras).map(decide).collect()
 }
 
@@ -72,6 +73,16 @@ impl Key {
             Self::Hue(chroma.map(|c| c / strength), strength)
         } else {
             Self::Distance(backdrop)
+        }
+    }
+
+    /// The least score of what may be filled in because the hull says so. Before a dark backdrop an unlit part
+    /// looks like it; before any other, what looks like it is an opening (between the legs of the dinosaur).
+    fn fill_level(&self, level: f32) -> f32 {
+        match self {
+            Self::Brightness => 0.0,
+            Self::Hue(..) => 0.5 * (85.0 + level),
+            Self::Distance(_) => 0.5 * level,
         }
     }
 
@@ -156,11 +167,21 @@ fn above(score: &Image<f32>, level: f32) -> Image<u8> {
     score.map(|v| if v >= level { 255 } else { 0 })
 }
 
-/// Removes parts smaller than a hundredth of the largest.
+/// Keeps the largest part and those of at least a hundredth of it that lie within the frame: what reaches
+/// in from the border is the room, or the black margin of a digitised frame.
 fn without_specks(mask: &Image<u8>) -> Image<u8> {
     let (sizes, labels) = components(&mask.map(|v| v >= 128));
-    let least = sizes.iter().max().copied().unwrap_or(0) / 100;
-    labels.map(|l| if l > 0 && sizes[l as usize - 1] > least { 255 } else { 0 })
+    let largest = sizes.iter().max().copied().unwrap_or(0);
+    let mut keep: Vec<bool> = sizes.iter().map(|&size| size * 100 >= largest).collect();
+    let (w, h) = (labels.width(), labels.height());
+    let border = (0..w).flat_map(|x| [(x, 0), (x, h - 1)]).chain((0..h).flat_map(|y| [(0, y), (w - 1, y)]));
+    for (x, y) in border {
+        let label = labels.at(x, y) as usize;
+        if label > 0 && sizes[label - 1] < largest {
+            keep[label - 1] = false;
+        }
+    }
+    labels.map(|l| if l > 0 && keep[l as usize - 1] { 255 } else { 0 })
 }
 
 /// What most views agree on.
@@ -227,13 +248,15 @@ fn equal_error_level(object: &[u64; 256], backdrop: &[u64; 256]) -> f32 {
     0.5 * (from + to) as f32
 }
 
-fn decided(score: &Image<f32>, level: f32, camera: &Camera, hull: &Hull) -> Image<u8> {
+fn decided(score: &Image<f32>, level: f32, fill_level: f32, camera: &Camera, hull: &Hull) -> Image<u8> {
     let (likely, cell) = hull.votes.project(&hull.likely, camera);
     let (sure, _) = hull.votes.project(&hull.sure, camera);
     let near = grow(&likely, 1.0 + 0.5 * cell);
     let inner = erode(&sure, 1.0 + 1.5 * cell);
     let object = score.pixels().iter().zip(near.pixels()).zip(inner.pixels());
-    let object = object.map(|((&s, &near), &inner)| if near >= 128 && (s >= level || inner >= 128) { 255 } else { 0 });
+    let object = object.map(
+        |((&s, &near), &inner)| if near >= 128 && (s >= level || (inner >= 128 && s >= fill_level)) { 255 } else { 0 },
+    );
     let mask = Image::from_pixels(score.width(), score.height(), object.collect()).unwrap_or_default();
     without_pinholes(&without_specks(&mask))
 }

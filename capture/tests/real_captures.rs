@@ -1,5 +1,7 @@
 //! Reads the research captures of `../shared/data` (see its README); skips, saying so, without them.
 
+#![allow(clippy::unwrap_used, reason = "tests fail by panicking, helpers included")]
+
 use capture::{Capture, CaptureFormat, LoadOptions, MaskSource, detect_format};
 use std::path::{Path, PathBuf};
 
@@ -61,8 +63,12 @@ fn oxford_matrices_decompose_and_come_back() {
     let line = text.lines().nth(1).unwrap();
     let n: Vec<f64> = line.split_whitespace().skip(1).map(|w| w.parse().unwrap()).collect();
     let p = capture.frames[0].camera.projection_matrix();
-    // Undo the half pixel, then compare up to scale.
-    let p = |row: usize, column: usize| p[(row, column)] - if row < 2 { 0.5 * p[(2, column)] } else { 0.0 };
+    // Undo the half pixel and the third axis (the matrices are for a left-handed world), then compare up to
+    // scale.
+    let p = |row: usize, column: usize| {
+        let value = p[(row, column)] - if row < 2 { 0.5 * p[(2, column)] } else { 0.0 };
+        if column == 2 { -value } else { value }
+    };
     let scale = n[11] / p(2, 3);
     for (k, expected) in n.iter().enumerate() {
         assert!((scale * p(k / 4, k % 4) - expected).abs() < 1e-9, "entry {k}");
@@ -98,8 +104,29 @@ fn iou(a: &capture::View, b: &capture::View) -> f64 {
 
 #[test]
 fn silhouettes_agree_with_the_scoring_masks() {
-    for name in ["templeRing", "dinoRing", "oxford_dinosaur", "squirrel_turntable", "ethz_david"] {
+    for name in ["oxford_dinosaur", "templeRing", "dinoRing", "squirrel_turntable", "ethz_david"] {
         let Some((mean, _)) = silhouette_iou(name) else { continue };
-        assert!(mean > 0.5, "{name}: {mean}");
+        // The scoring masks of the dinosaur lie a pixel right and below of its photographs: a plain threshold
+        // of view 17 agrees with them to 0.957 in place, to 0.995 moved by (1, 1).
+        let least = if name == "oxford_dinosaur" { 0.96 } else { 0.97 };
+        assert!(mean >= least, "{name}: {mean}");
+    }
+}
+
+#[test]
+fn real_captures_pass_the_check() {
+    for name in
+        ["analytic_torus", "templeRing", "dinoRing", "oxford_dinosaur", "squirrel_turntable", "ethz_david", "nerf_lego"]
+    {
+        let Some(path) = data(name) else { continue };
+        let capture = Capture::read(&path).unwrap();
+        let views = capture.load_all_views(&LoadOptions { downscale: 1 }).unwrap();
+        let check = capture::doctor::check(&capture, &views);
+        let [left, right] = check.consistency_half_pixel;
+        println!(
+            "{name}: IoU {:.3}, rays {:.3} ({left:.3} {right:.3}), {:?}, {:?}",
+            check.silhouette_iou, check.silhouette_consistency, check.layout, check.findings
+        );
+        assert_eq!(check.center_in_frame, capture.frames.len(), "{name}");
     }
 }

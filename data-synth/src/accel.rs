@@ -2,8 +2,9 @@
 //!
 //! The `bvh` crate builds the tree (surface-area heuristic); we walk it ourselves, because its own
 //! iterators visit every leaf a ray might meet, while a camera ray wants the nearest hit and a shadow
-//! ray any. Nodes hold the boxes of both children in one cache line, leaves up to four triangles in
-//! tree order.
+//! ray any. Pairs of levels are merged into nodes of four boxes that are tested side by side (Dammertz,
+//! Hanika, Keller, "Shallow Bounding Volume Hierarchies", EGSR 2008); leaves hold up to four triangles
+//! in tree order.
 
 use crate::material::Vec3;
 use bvh::aabb::{Aabb, Bounded};
@@ -14,8 +15,12 @@ use nalgebra::Point3;
 
 /// Triangles a leaf holds at most, unless the tree grows too deep.
 const LEAF: u32 = 4;
-/// Deepest node kept as a node: the walk's stack has this many places.
-const MAX_DEPTH: usize = 64;
+/// Deepest node kept as a node: what lies below becomes one leaf.
+const MAX_DEPTH: usize = 40;
+/// Boxes per node.
+const WIDTH: usize = 4;
+/// Places on the walk's stack: a node leaves at most three boxes waiting on each level.
+const STACK: usize = MAX_DEPTH * (WIDTH - 1) + WIDTH;
 /// Slack of the barycentric test, so that no ray slips between two triangles sharing an edge.
 const EDGE_SLACK: f32 = 1e-5;
 
@@ -37,14 +42,31 @@ pub(crate) struct Accel {
     triangles: Vec<Triangle>,
 }
 
+/// Four boxes with what they hold, laid out so that one instruction tests all four.
 #[derive(Clone, Copy, Debug)]
 struct Node {
-    low: [Vec3; 2],
-    high: [Vec3; 2],
+    /// Lower, then upper bounds: by axis, by child.
+    bounds: [[[f32; WIDTH]; 3]; 2],
     /// First triangle of a leaf, otherwise the node.
-    child: [u32; 2],
+    child: [u32; WIDTH],
     /// Triangles of a leaf, otherwise zero.
-    count: [u32; 2],
+    count: [u32; WIDTH],
+}
+
+/// A box still to be visited.
+#[derive(Clone, Copy, Default)]
+struct Pending {
+    entry: f32,
+    child: u32,
+    count: u32,
+}
+
+/// A ray with what the box test needs of it.
+struct Probe {
+    origin: Vec3,
+    inverse: Vec3,
+    /// Per axis, whether the ray runs down it and meets the upper bound first.
+    down: [usize; 3],
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -112,60 +134,85 @@ impl Accel {
         blocked
     }
 
-    /// Visits triangles near first until `visit` returns true.
+    /// Visits triangles near box first until `visit` returns true.
     #[inline]
     fn walk(&self, origin: Vec3, direction: Vec3, limit: f32, mut visit: impl FnMut(&Triangle, &mut f32) -> bool) {
-        if self.nodes.is_empty() {
-            return;
-        }
-        // A zero component gives ±∞, which the slab test handles; NaN comparisons count as a miss.
-        let inverse = direction.map(|d| 1.0 / d);
+        let probe = Probe::new(origin, direction);
         let mut reach = limit;
-        let mut stack = [(0_u32, 0.0_f32); MAX_DEPTH + 2];
-        let mut top = 1;
+        let mut stack = [Pending::default(); STACK];
+        let mut top = usize::from(!self.nodes.is_empty());
         while top > 0 {
             top -= 1;
-            let (index, entry) = stack[top];
-            if entry >= reach {
+            let at = stack[top];
+            if at.entry >= reach {
                 continue;
             }
-            let node = &self.nodes[index as usize];
-            let entries = [0, 1].map(|side| node.entry(side, origin, inverse, reach));
-            let first = usize::from(entries[1] < entries[0]);
-            // Leaves are tested at once, near side first; nodes are pushed far side first.
-            for side in [first, 1 - first] {
-                if node.count[side] > 0 && entries[side] < reach {
-                    let start = node.child[side] as usize;
-                    for triangle in &self.triangles[start..start + node.count[side] as usize] {
-                        if visit(triangle, &mut reach) {
-                            return;
-                        }
-                    }
-                }
+            if at.count == 0 {
+                self.nodes[at.child as usize].push_met(&probe, reach, &mut stack, &mut top);
+                continue;
             }
-            for side in [1 - first, first] {
-                if node.count[side] == 0 && entries[side] < reach {
-                    stack[top] = (node.child[side], entries[side]);
-                    top += 1;
+            let start = at.child as usize;
+            for triangle in &self.triangles[start..start + at.count as usize] {
+                if visit(triangle, &mut reach) {
+                    return;
                 }
             }
         }
     }
 }
 
+impl Probe {
+    fn new(origin: Vec3, direction: Vec3) -> Self {
+        // A zero component gives ±∞. Where that makes NaN (a ray in the plane of a box's face), the
+        // comparisons below are false and the axis does not count: the box is visited.
+        let inverse = direction.map(|d| 1.0 / d);
+        let down = [0, 1, 2].map(|axis| usize::from(inverse[axis] < 0.0));
+        Self { origin, inverse, down }
+    }
+}
+
 impl Node {
-    /// Where the ray enters the child's box, or infinity.
+    /// Boxes no ray meets.
+    const EMPTY: Self = Self {
+        bounds: [[[f32::INFINITY; WIDTH]; 3], [[f32::NEG_INFINITY; WIDTH]; 3]],
+        child: [0; WIDTH],
+        count: [0; WIDTH],
+    };
+
+    /// Puts the boxes the ray meets within `reach` on the stack, the nearest on top.
     #[inline]
-    fn entry(&self, side: usize, origin: Vec3, inverse: Vec3, reach: f32) -> f32 {
-        let (low, high) = (&self.low[side], &self.high[side]);
-        let (mut near, mut far) = (0.0_f32, reach);
-        for axis in 0..3 {
-            let a = (low[axis] - origin[axis]) * inverse[axis];
-            let b = (high[axis] - origin[axis]) * inverse[axis];
-            near = near.max(a.min(b));
-            far = far.min(a.max(b));
+    fn push_met(&self, probe: &Probe, reach: f32, stack: &mut [Pending; STACK], top: &mut usize) {
+        let (near, far) = self.slabs(probe, reach);
+        let first = *top;
+        for k in 0..WIDTH {
+            if near[k] > far[k] {
+                continue;
+            }
+            let new = Pending { entry: near[k], child: self.child[k], count: self.count[k] };
+            let mut place = *top;
+            while place > first && stack[place - 1].entry < new.entry {
+                stack[place] = stack[place - 1];
+                place -= 1;
+            }
+            stack[place] = new;
+            *top += 1;
         }
-        if near <= far { near } else { f32::INFINITY }
+    }
+
+    /// Where the ray enters and leaves each box; it misses where it enters after leaving.
+    #[inline]
+    fn slabs(&self, probe: &Probe, reach: f32) -> ([f32; WIDTH], [f32; WIDTH]) {
+        let (mut near, mut far) = ([0.0_f32; WIDTH], [reach; WIDTH]);
+        for axis in 0..3 {
+            let (o, inverse, down) = (probe.origin[axis], probe.inverse[axis], probe.down[axis]);
+            let (first, last) = (&self.bounds[down][axis], &self.bounds[1 - down][axis]);
+            for k in 0..WIDTH {
+                let (a, b) = ((first[k] - o) * inverse, (last[k] - o) * inverse);
+                near[k] = if a > near[k] { a } else { near[k] };
+                far[k] = if b < far[k] { b } else { far[k] };
+            }
+        }
+        (near, far)
     }
 }
 
@@ -205,40 +252,44 @@ struct Flatten<'a> {
 
 impl Flatten<'_> {
     fn root(&mut self) {
-        if self.faces_below(0) <= LEAF {
-            // A tree of one leaf has no node: give it one with an empty second child.
-            let bounds = self.leaves.iter().fold(Aabb::empty(), |b, l| b.join(&l.bounds));
-            let (child, count) = self.leaf(0);
-            let (low, high) = (bounds.min.coords, bounds.max.coords);
-            let nothing = Vec3::repeat(f32::INFINITY);
-            self.out.nodes.push(Node {
-                low: [low, nothing],
-                high: [high, nothing],
-                child: [child, 0],
-                count: [count, 0],
-            });
-            return;
-        }
-        self.node(0, 0);
+        let whole = self.leaves.iter().fold(Aabb::empty(), |b, l| b.join(&l.bounds));
+        self.node(&[(0, whole)], 0);
     }
 
-    /// Appends an inner node and all below it; returns its index.
-    fn node(&mut self, index: usize, depth: usize) -> u32 {
-        let BvhNode::Node { child_l_index, child_l_aabb, child_r_index, child_r_aabb, .. } = self.tree[index] else {
-            return 0;
-        };
+    /// Appends a node over the given subtrees, opened until there are four, and all below it.
+    fn node(&mut self, subtrees: &[(usize, Aabb<f32, 3>)], depth: usize) -> u32 {
+        let children = self.opened(subtrees.to_vec());
         let at = self.out.nodes.len();
-        let boxes = [child_l_aabb, child_r_aabb];
-        let low = boxes.map(|b| b.min.coords);
-        let high = boxes.map(|b| b.max.coords);
-        self.out.nodes.push(Node { low, high, child: [0; 2], count: [0; 2] });
-        for (side, child) in [child_l_index, child_r_index].into_iter().enumerate() {
+        self.out.nodes.push(Node::EMPTY);
+        for (k, (child, bounds)) in children.into_iter().enumerate() {
             let is_leaf = depth + 1 >= MAX_DEPTH || self.faces_below(child) <= LEAF;
-            let (to, count) = if is_leaf { self.leaf(child) } else { (self.node(child, depth + 1), 0) };
-            self.out.nodes[at].child[side] = to;
-            self.out.nodes[at].count[side] = count;
+            let (to, count) = if is_leaf { self.leaf(child) } else { (self.node(&[(child, bounds)], depth + 1), 0) };
+            let node = &mut self.out.nodes[at];
+            node.child[k] = to;
+            node.count[k] = count;
+            for axis in 0..3 {
+                node.bounds[0][axis][k] = bounds.min[axis];
+                node.bounds[1][axis][k] = bounds.max[axis];
+            }
         }
         at as u32
+    }
+
+    /// Replaces the subtree of the largest surface by its two children while there is room.
+    fn opened(&self, mut subtrees: Vec<(usize, Aabb<f32, 3>)>) -> Vec<(usize, Aabb<f32, 3>)> {
+        while subtrees.len() < WIDTH {
+            let open = |s: &(usize, Aabb<f32, 3>)| self.faces_below(s.0) > LEAF;
+            let candidates = subtrees.iter().enumerate().filter(|(_, s)| open(s));
+            let largest = candidates.max_by(|a, b| a.1.1.surface_area().total_cmp(&b.1.1.surface_area()));
+            let Some((k, &(index, _))) = largest else { break };
+            let BvhNode::Node { child_l_index, child_l_aabb, child_r_index, child_r_aabb, .. } = self.tree[index]
+            else {
+                break;
+            };
+            subtrees[k] = (child_l_index, child_l_aabb);
+            subtrees.push((child_r_index, child_r_aabb));
+        }
+        subtrees
     }
 
     /// Counts faces, giving up beyond [`LEAF`].

@@ -176,7 +176,9 @@ impl Exposure<'_> {
             rays += 1;
             let Some(hit) = self.world.first_hit(lens.origin, direction) else { continue };
             let traced = self.world.radiance(hit, direction, self.rig, &self.limits, &mut sampler);
-            let half = (i % 2) as usize;
+            // The low bits of the sample number choose the stratum: even and odd would be two parts of
+            // the pixel, not two pictures of it.
+            let half = usize::from(2 * i >= self.samples);
             halves[half] += traced.radiance;
             met[half] += 1;
             rays += traced.rays;

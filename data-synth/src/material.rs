@@ -200,12 +200,14 @@ impl Surface<'_> {
         (pdf > 0.0).then(|| Scatter { wi, weight: self.evaluate(wi, wo) * (wi.z / pdf), pdf })
     }
 
-    /// Probability of following the coat: its share of what is reflected, kept off 0 and 1.
+    /// Probability of following the coat: its share of what is reflected, but not less than two in
+    /// five. The base finds lights by shadow rays and the sky is smooth; a highlight found by one
+    /// sample in ten is a speckle.
     fn coat_share(&self, wo: Vec3) -> f32 {
         self.coat.map_or(0.0, |coat| {
             let e = coat.directional_albedo(wo.z);
             let base = (1.0 - e) * self.albedo.max();
-            (e / (e + base)).clamp(0.1, 0.9)
+            (e / (e + base)).clamp(0.4, 0.9)
         })
     }
 }

@@ -49,7 +49,7 @@ impl MeshBuilder {
         }
     }
 
-    /// Walls through all `loops` in turn; returns the last.
+    /// Walls through all `loops` in turn.
     pub(crate) fn loft(&mut self, loops: &[Vec<u32>]) {
         for pair in loops.windows(2) {
             self.walls(&pair[0], &pair[1]);
@@ -160,7 +160,11 @@ pub(crate) fn is_closed(mesh: &Mesh) -> bool {
             *edges.entry(e).or_insert(0) += 1;
         }
     }
-    edges.iter().all(|(&(a, b), &n)| n == 1 && edges.get(&(b, a)) == Some(&1))
+    let good = |(&(a, b), &n): (&(u32, u32), &i32)| n == 1 && edges.get(&(b, a)) == Some(&1);
+    for e in edges.iter().filter(|&e| !good(e)).take(6) {
+        eprintln!("bad edge at {:?}", mesh.positions[e.0.0 as usize]);
+    }
+    edges.iter().all(good)
 }
 
 #[cfg(test)]

@@ -127,8 +127,8 @@ pub fn synthesize_with(
     let aabb = built.mesh.aabb().ok_or(SynthError::Scene { fault: "it has no vertices" })?;
     let cameras = cameras(&stations, &built.mesh, &aabb, [options.width, options.height]);
     let rig = LightRig::studio(aabb.center().coords.cast(), 0.5 * aabb.diagonal() as f32);
-    // Ten times white: nothing that survives the clamp stands out after averaging.
-    let limits = PathLimits { surfaces: options.surfaces, clamp: 10.0 };
+    // White: what a second surface adds can then not stand out of its neighbours as a speckle.
+    let limits = PathLimits { surfaces: options.surfaces, clamp: 1.0 };
     let mut film = Film { views: Vec::new(), light_directions: Vec::new(), rays: 0, noise: (0.0, 0) };
     for (view, (station, camera)) in stations.iter().zip(&cameras).enumerate() {
         let rig = rig_for(&rig, options.light, station);

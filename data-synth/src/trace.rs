@@ -1,7 +1,7 @@
 //! A path tracer for one mesh under a light rig.
 //!
-//! At each surface point one shadow ray goes to a light and one ray is scattered; the two ways of
-//! finding a light are combined by the power heuristic (Veach 1997, chapter 9). The sky is found by
+//! At each surface point one shadow ray goes to every light (a choice among them is noisy wherever the
+//! key light is hidden) and one ray is scattered; the two ways of finding a light are combined by the power heuristic (Veach 1997, chapter 9). The sky is found by
 //! scattering alone: it is smooth. After [`PathLimits::surfaces`] surfaces a path ends, and what comes
 //! by way of a second surface is clamped ([`PathLimits::clamp`]): the only bias, against fireflies.
 
@@ -94,9 +94,10 @@ impl World {
             let Some(point) = self.point(hit, direction) else { break };
             let clamp = if depth == 0 { f32::INFINITY } else { limits.clamp };
             let mut gather = |light: Vec3| traced.radiance += light.map(|c| c.min(clamp));
-            // Look for a light with a shadow ray.
-            if let Some(light) = rig.sample(point.position, point.geometric, sampler.pair()) {
-                let (seen, rays) = self.direct(&point, &light);
+            // Look for each light with a shadow ray.
+            for light in &rig.lights {
+                let Some(sample) = light.sample(point.position, sampler.pair()) else { continue };
+                let (seen, rays) = self.direct(&point, &sample);
                 gather(throughput.component_mul(&seen));
                 traced.rays += rays;
             }
@@ -107,7 +108,7 @@ impl World {
             let origin = point.origin(towards, self.offset);
             let found = self.accel.nearest(origin, towards, f32::INFINITY);
             let reach = found.map_or(f32::INFINITY, |h| h.distance);
-            if let Some(light) = rig.hit(point.position, point.geometric, towards, reach) {
+            if let Some(light) = rig.hit(point.position, towards, reach) {
                 gather(throughput.component_mul(&light.radiance) * power_heuristic(scatter.pdf, light.pdf));
             } else if found.is_none() {
                 gather(throughput.component_mul(&rig.sky.radiance(towards)));

@@ -5,7 +5,10 @@
 //! size) and padded data. Type 15 wraps one zlib-compressed element. A matrix (type 14) holds flags,
 //! dimensions, a name, and its numbers or, for a cell, more matrices.
 
-use super::{capture, file_name, is_image, list, natural_order, projections::projection_frame};
+use super::{
+    capture, file_name, is_image, list, natural_order,
+    projections::{facing_the_object, projection_frame},
+};
 use crate::{Capture, CaptureError};
 use nalgebra::Matrix3x4;
 use std::io::Read;
@@ -37,7 +40,7 @@ pub(super) fn read(file: &Path) -> Result<Capture, CaptureError> {
         images.iter().zip(&matrices).enumerate().map(|(i, (image, matrix))| {
             projection_frame(file, folder, &file_name(image), &format!("cell {i}"), matrix)
         });
-    Ok(capture(frames.collect::<Result<_, _>>()?))
+    Ok(capture(facing_the_object(frames.collect::<Result<_, _>>()?)))
 }
 
 /// The matrices of the first cell array. `None` where the file is something else.

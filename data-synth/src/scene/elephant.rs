@@ -19,7 +19,7 @@ const EAR: u8 = 3;
 /// Metres per modelling unit.
 const SCALE: f64 = 0.13;
 /// Grid cells per modelling unit.
-const CELLS: f64 = 82.0;
+const CELLS: f64 = 52.0;
 /// Where the body's middle lies along x: put onto the turntable's axis.
 const MIDDLE: f64 = 0.19;
 
@@ -28,7 +28,7 @@ type P = Vector3<f64>;
 /// Builds the mesh.
 pub(crate) fn build() -> MeshBuilder {
     let grid = Grid::around(P::new(-0.72, -0.62, 0.0), P::new(1.1, 0.62, 1.12), 1.0 / CELLS);
-    let mut b = extract(&grid, |p| distances(p).into_iter().fold(f64::INFINITY, f64::min));
+    let mut b = extract(&grid, surface);
     let part_of = |f: usize| part_at(nalgebra::center(&b.mesh.corners(f)[0], &b.mesh.corners(f)[1]).coords);
     b.parts = (0..b.mesh.faces.len()).map(part_of).collect();
     let bottom = b.mesh.positions.iter().fold(f64::INFINITY, |m, p| m.min(p.z));
@@ -39,13 +39,25 @@ pub(crate) fn build() -> MeshBuilder {
     b
 }
 
+/// Distance to the whole figure; tusks grow out of the cheek in a soft collar.
+fn surface(p: P) -> f64 {
+    let [body, tusk, eye, _] = distances(p);
+    smooth_min(body, tusk, 0.03).min(eye)
+}
+
 /// Distances to body, tusks, eyes and ears, in this order of parts.
 fn distances(p: P) -> [f64; 4] {
     // The figure is its own mirror image but for the tail, which lies in the plane of symmetry.
     let q = P::new(p.x, p.y.abs(), p.z);
     let tusk = chain(
         q,
-        &[(0.60, 0.10, 0.62, 0.040), (0.72, 0.135, 0.51, 0.033), (0.84, 0.13, 0.48, 0.025), (0.93, 0.11, 0.53, 0.017)],
+        &[
+            (0.60, 0.105, 0.64, 0.041),
+            (0.674, 0.150, 0.546, 0.038),
+            (0.757, 0.168, 0.500, 0.034),
+            (0.849, 0.162, 0.490, 0.028),
+            (0.95, 0.140, 0.515, 0.020),
+        ],
         0.01,
     );
     let eye = (q - P::new(0.652, 0.118, 0.80)).norm() - 0.026;
@@ -107,16 +119,18 @@ fn leg(q: P, foot: P) -> f64 {
 
 /// A fan of cartilage: a flat, slightly cupped ellipsoid, hinged behind the cheek.
 fn ear(q: P) -> f64 {
-    let (out, back) = (0.62_f64, -0.785_f64);
+    let (out, back) = (0.74_f64, -0.673_f64);
     let along = P::new(back, out, 0.0);
     let across = P::new(out, -back, 0.0);
-    let hinge = P::new(0.47, 0.13, 0.76);
+    let hinge = P::new(0.47, 0.135, 0.80);
     let r = q - hinge;
     let (s, t, z) = (r.dot(&along), r.dot(&across), r.z);
     // Cupped forward, and wider above than below, as of an African elephant.
     let cup = t - 1.1 * (s - 0.16).powi(2) - 0.25 * z * z;
-    let width = 0.20 + 0.10 * z;
-    ellipsoid(P::new(s, cup, z), P::new(0.165, 0.0, 0.0), P::new(width.max(0.1), 0.034, 0.27)) * 0.8
+    let outline = ellipsoid(P::new(s - 0.165, 0.0, z), P::zeros(), P::new((0.17 + 0.10 * z).max(0.1), 1.0, 0.23));
+    // A slab with a round rim, thicker than the cells of the mesh (Quilez' extrusion).
+    let side = cup.abs() - 0.006;
+    outline.max(side).min(0.0) + outline.max(0.0).hypot(side.max(0.0)) - 0.022
 }
 
 /// An approximate distance with the right sign and the right slope at the surface.
@@ -226,8 +240,7 @@ fn cloth(q: Vec3, under: Vec3, gold: Vec3) -> Vec3 {
     }
     let (du, dv) = (wrap(u, 0.115), wrap(v, 0.115));
     let flower = (du * du + dv * dv).sqrt() + 0.010 * (6.0 * dv.atan2(du)).cos();
-    let lattice =
-        stripe(wrap(u + v, 0.115) - 0.0575 * 0.0, 0.0, 0.004).max(stripe((du.abs() + dv.abs()) - 0.0575, 0.004, 0.004));
+    let lattice = stripe(wrap(u + v, 0.115), 0.0, 0.004).max(stripe((du.abs() + dv.abs()) - 0.0575, 0.004, 0.004));
     let mut field = blend(color([142, 20, 34]), color([172, 34, 44]), noise(q * 40.0, 61));
     field = blend(field, gold, lattice);
     field = blend(field, color([238, 222, 190]), 1.0 - step(0.030, 0.005, flower));

@@ -35,8 +35,7 @@ struct Level {
 
 /// Builds the mesh.
 pub(crate) fn build() -> MeshBuilder {
-    let mut b = MeshBuilder::default();
-    b.part = STEPS;
+    let mut b = MeshBuilder { part: STEPS, ..MeshBuilder::default() };
     let platform = steps(&mut b);
     let floor = level(&mut b, FLOOR_Z);
     let ceiling = level(&mut b, CEILING_Z);
@@ -219,18 +218,18 @@ pub(crate) fn albedo(p: Vec3, normal: Vec3, part: u8) -> Vec3 {
     };
     // Soot and rain: darker patches low down and in streaks.
     let grime = fractal(p.component_mul(&Vec3::new(140.0, 140.0, 45.0)), 4, 71);
-    base * (1.0 - 0.45 * step(0.58, 0.22, grime))
+    base * (1.0 - 0.28 * step(0.60, 0.30, grime))
 }
 
 /// Cream limestone: slow hue changes, veins, fine grain and pits.
 fn stone(p: Vec3) -> Vec3 {
     let slow = fractal(p * 55.0, 4, 1);
-    let grain = noise(p * 1500.0, 7) * 0.6 + noise(p * 3100.0, 8) * 0.4;
+    let grain = noise(p * 700.0, 7) * 0.6 + noise(p * 1400.0, 8) * 0.4;
     let vein = 1.0 - (2.0 * fractal(p * 90.0, 5, 17) - 1.0).abs();
     let tone = blend(color([206, 186, 150]), color([240, 230, 208]), slow);
     let tone = blend(tone, color([176, 148, 108]), 0.5 * step(0.94, 0.08, vein));
-    let pits = step(0.80, 0.06, noise(p * 700.0, 23));
-    tone * (0.82 + 0.24 * grain).min(1.0) * (1.0 - 0.45 * pits)
+    let pits = step(0.82, 0.08, noise(p * 420.0, 23));
+    tone * (0.82 + 0.24 * grain).min(1.0) * (1.0 - 0.3 * pits)
 }
 
 /// Stone cut into courses of blocks of the given length and height, each of its own shade.

@@ -7,12 +7,7 @@ use crate::param::FlatChart;
 use nalgebra::Point2;
 
 /// Faces in input order, vertices chart by chart; also per vertex the input's.
-pub(super) fn assemble(
-    input: &Mesh,
-    clean: &Clean,
-    charts: &[FlatChart],
-    placed: &Placed,
-) -> (TexturedMesh, Vec<u32>) {
+pub(super) fn assemble(input: &Mesh, clean: &Clean, charts: &[FlatChart], placed: &Placed) -> (TexturedMesh, Vec<u32>) {
     let [width, height] = placed.size.map(|s| s as f64);
     let mut faces = vec![[0; 3]; clean.kept.len()];
     let mut face_charts = vec![0; clean.kept.len()];

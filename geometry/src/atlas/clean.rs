@@ -30,10 +30,8 @@ pub(super) fn clean(mesh: &Mesh) -> Result<Clean, GeometryError> {
     }
     let positions = mesh.positions.iter().map(|p| ((p.coords - center) / scale).into()).collect();
     let all = Mesh { positions, faces: mesh.faces.clone() };
-    let with_area: Vec<u32> = (0..all.faces.len())
-        .filter(|&f| all.face_area_vector(f).norm() > 2.0 * MIN_AREA)
-        .map(|f| f as u32)
-        .collect();
+    let with_area: Vec<u32> =
+        (0..all.faces.len()).filter(|&f| all.face_area_vector(f).norm() > 2.0 * MIN_AREA).map(|f| f as u32).collect();
     let degenerate = all.faces.len() - with_area.len();
     let kept = without_repeats(&all.faces, &with_area);
     if kept.is_empty() {

@@ -71,7 +71,13 @@ fn place_at(
 /// of charts align.
 fn cell_size(side: f64, charts: usize, gutter_px: usize) -> usize {
     let chart_side = side / (charts as f64).sqrt();
-    let finest = if side > 2048.0 { 4 } else if side > 700.0 { 2 } else { 1 };
+    let finest = if side > 2048.0 {
+        4
+    } else if side > 700.0 {
+        2
+    } else {
+        1
+    };
     let wanted = (chart_side / 40.0).max(1.0) as usize;
     wanted.next_power_of_two().min(8).max(finest).min(gutter_px.next_power_of_two().max(4))
 }

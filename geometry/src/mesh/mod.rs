@@ -2,9 +2,13 @@
 
 mod check;
 pub mod half_edge;
+mod islands;
+mod separate;
 mod smooth;
 
 pub use check::MeshCheck;
+pub use islands::without_islands;
+pub use separate::separate_sheets;
 pub use smooth::{TaubinOptions, taubin_smooth};
 
 use capture::Aabb;

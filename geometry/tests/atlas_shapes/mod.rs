@@ -42,7 +42,8 @@ fn noise(p: Vector3<f64>) -> f64 {
         let d = Vector3::new((i & 1) as f64, (i >> 1 & 1) as f64, (i >> 2) as f64);
         let weight: f64 = (0..3).map(|k| if d[k] > 0.0 { t[k] } else { 1.0 - t[k] }).product();
         let key = (cell + d).map(|x| x as i64);
-        let mut h = (key.x.wrapping_mul(73_856_093) ^ key.y.wrapping_mul(19_349_663) ^ key.z.wrapping_mul(83_492_791)) as u64;
+        let mut h =
+            (key.x.wrapping_mul(73_856_093) ^ key.y.wrapping_mul(19_349_663) ^ key.z.wrapping_mul(83_492_791)) as u64;
         h = (h ^ (h >> 31)).wrapping_mul(0x9E37_79B9_7F4A_7C15);
         weight * ((h >> 40) as f64 / f64::from(1 << 23) - 1.0)
     };

@@ -118,9 +118,9 @@ fn mean_layer(bake: &Bake<'_>, bases: &[Basis], options: &FitOptions) -> Option<
 fn basis_layer(bake: &Bake<'_>, bases: &[Basis], k: usize, options: &FitOptions) -> Option<Layer> {
     let values: Vec<Vec<[f32; 3]>> =
         bases.iter().map(|b| b.layers.get(k).cloned().unwrap_or_else(|| vec![[0.0; 3]; b.seen.len()])).collect();
-    // Facets without this layer are told to be zero, so that push-pull does not spill into them.
-    let known: Vec<Vec<bool>> =
-        bases.iter().map(|b| if k < b.layers.len() { b.seen.clone() } else { vec![true; b.seen.len()] }).collect();
+    // Known everywhere: what is unseen, or beyond a facet's rank, is zero, so that nothing spills into it
+    // from facets whose layers mean something else.
+    let known: Vec<Vec<bool>> = bases.iter().map(|b| vec![true; b.seen.len()]).collect();
     let scale = (clip_level(&values) / 127.0).max(1e-6);
     let stored = bake.paint(&values, &known).map(|p| p.map(|v| (128.0 + v / scale).round().clamp(1.0, 255.0) as u8));
     let coded = coding::encode_jpeg(&stored, options.quantiser / f64::from(scale))?;
