@@ -3,7 +3,7 @@
 //!
 //! - [`pipeline`]: views → hull → simplified mesh → atlas → appearance;
 //! - [`evaluate`]: the four methods on held-out views, as JSON, CSV and one HTML page;
-//! - [`inspect`]: what is wrong with a capture, and the likely cause;
+//! - [`inspect`]: what a mesh, a model or a capture holds;
 //! - [`output`]: files and folders that appear whole or not at all;
 //! - [`stages`]: what each stage costs.
 

@@ -5,7 +5,7 @@ use crate::Answer;
 use crate::arguments::InfoArgs;
 use serde_json::json;
 use std::path::Path;
-use turnlight::capture::detect_format;
+use turnlight::capture::{LoadOptions, detect_format, doctor};
 use turnlight::inspect::{self, MeshFacts, ModelFacts};
 use turnlight::stages::{Observer, Stages};
 use turnlight::texture::{self, Model};
@@ -41,9 +41,18 @@ fn glb(path: &Path) -> Result<Answer, Error> {
 
 const EXTENSION: &[u8] = texture::EXTENSION.as_bytes();
 
+/// Up to this many views are looked at; more say nothing new.
+const CHECKED_VIEWS: usize = 48;
+
 fn capture(args: &InfoArgs, observer: &dyn Observer) -> Result<Answer, Error> {
     let (format, _) = detect_format(&args.path)?;
     let capture = read_capture(&args.path, args.ignore_masks)?;
-    let facts = inspect::capture_facts(&capture, &format.to_string(), &mut Stages::new(observer))?;
-    Ok(Answer { text: facts.text(), json: json!(facts) })
+    let count = capture.frames.len();
+    let positions: Vec<usize> = (0..count).step_by(count.div_ceil(CHECKED_VIEWS).max(1)).collect();
+    let mut stages = Stages::new(observer);
+    let views = stages.run("load", |_| capture.load_views(&positions, &LoadOptions::default()))?;
+    let check = stages.run("check", |_| doctor::check(&capture, &views));
+    let mut json = json!(check);
+    json["format"] = json!(format.to_string());
+    Ok(Answer { text: inspect::capture_text(&format.to_string(), &check), json })
 }

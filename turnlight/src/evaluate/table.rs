@@ -20,7 +20,7 @@ pub(super) const COLUMNS: [Column; 18] = [
     ("hole_pct", |m| Some(m.hole_pct), 3),
     ("spill_pct", |m| Some(m.spill_pct), 3),
     ("seam", |m| m.seam, 3),
-    ("temporal", |m| m.temporal, 3),
+    ("temporal", |m| m.temporal, 4),
     ("bytes", |m| Some(m.bytes as f64), 0),
     ("bytes_raw", |m| Some(m.bytes_raw as f64), 0),
     ("build_s", |m| Some(m.build_s), 2),
