@@ -14,7 +14,7 @@ mod simplify;
 pub use atlas::{UnwrapOptions, UnwrapReport, Unwrapped, unwrap_mesh};
 pub use depth::DepthMap;
 pub use error::GeometryError;
-pub use hull::{Hull, HullOptions, HullReport, visual_hull};
+pub use hull::{Hull, HullChoice, HullOptions, HullReport, choose_hull, visual_hull};
 pub use mesh::{Mesh, MeshCheck, TexturedMesh, taubin_smooth};
 pub use param::FlatteningLimits;
 pub use segment::SegmentOptions;

@@ -27,17 +27,17 @@ struct Sight {
     focal: f64,
 }
 
-/// A box that holds the hull, with a margin of about three pixels.
+/// A box that holds the hull of silhouettes grown by `grow_px`, with a margin of a few pixels.
 ///
 /// # Errors
 /// The views do not determine one: all look along one direction, or no point is in all silhouettes.
-pub(super) fn find_box(views: &[View], binary: BinaryMatte, allowed: u32) -> Result<Aabb, GeometryError> {
+pub(super) fn find_box(views: &[View], grow_px: f64, allowed: u32) -> Result<Aabb, GeometryError> {
     let sights: Vec<Sight> = views.par_iter().filter_map(sight).collect();
     let middle = nearest_point(&sights)?;
     let mut half = half_size(&sights, &middle);
     let mut found = Aabb { min: middle - Vector3::repeat(half), max: middle + Vector3::repeat(half) };
     for _ in 0..ENLARGEMENTS {
-        let coarse = coarse_bounds(views, &sights, binary, allowed, &found, COARSE[0])?;
+        let coarse = coarse_bounds(views, &sights, grow_px, allowed, &found, COARSE[0])?;
         if !coarse.touches {
             found = coarse.aabb;
             break;
@@ -45,7 +45,7 @@ pub(super) fn find_box(views: &[View], binary: BinaryMatte, allowed: u32) -> Res
         half *= 1.6;
         found = Aabb { min: middle - Vector3::repeat(half), max: middle + Vector3::repeat(half) };
     }
-    Ok(coarse_bounds(views, &sights, binary, allowed, &found, COARSE[1])?.aabb)
+    Ok(coarse_bounds(views, &sights, grow_px, allowed, &found, COARSE[1])?.aabb)
 }
 
 /// Median over views of the world size of a pixel at `point`.
@@ -131,7 +131,7 @@ struct CoarseBounds {
 fn coarse_bounds(
     views: &[View],
     sights: &[Sight],
-    binary: BinaryMatte,
+    grow_px: f64,
     allowed: u32,
     aabb: &Aabb,
     cells: f64,
@@ -140,7 +140,9 @@ fn coarse_bounds(
     let middle = aabb.center();
     let pixels = median(sights.iter().map(|s| cell * s.focal / (middle - s.center).norm()).collect());
     // The farthest a point can be from its ray is half a diagonal of a cell's face; 10 % for perspective.
-    let grow_px = 1.1 * std::f64::consts::FRAC_1_SQRT_2 * pixels;
+    let grow_px = grow_px + 1.1 * std::f64::consts::FRAC_1_SQRT_2 * pixels;
+    // Grown by pixels, a matte needs no sub-pixel reading.
+    let binary = BinaryMatte::Midpoints;
     let cones = views.par_iter().map(|view| Cone::new(view, binary, grow_px)).collect::<Result<Vec<_>, _>>()?;
     let grid = Grid::new(aabb, cell);
     let sets = [0, 1, 2].map(|axis| RaySet::cast(&cones, axis, &grid, allowed));

@@ -280,3 +280,126 @@ fn lost_and_odd(sets: &[RaySet; 3]) -> Reconciled {
         })
         .fold(Reconciled::default(), add)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use capture::Aabb;
+
+    /// A small deterministic generator (Knuth's MMIX constants), in [0, 1).
+    fn random(state: &mut u64) -> f64 {
+        *state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        (*state >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    fn grid(cells: f64) -> Grid {
+        Grid::new(&Aabb { min: Point3::origin(), max: Point3::new(cells, cells, cells) }, 1.0)
+    }
+
+    fn assert_closed(mesh: &Mesh) {
+        let check = mesh.check().unwrap();
+        assert!(mesh.faces.is_empty() || (check.closed_manifold && check.degenerate_faces == 0), "{check:?}");
+        assert!(check.euler % 2 == 0 && check.volume >= 0.0);
+    }
+
+    /// Crossings half-way between nodes of different sign.
+    fn sets_of(grid: &Grid, inside: impl Fn([usize; 3]) -> bool + Sync) -> [RaySet; 3] {
+        [0, 1, 2].map(|axis| {
+            let [b, c] = super::super::cone::ACROSS[axis];
+            RaySet::from_rays(axis, grid, |ib, ic| {
+                let at = |i: usize| {
+                    let mut node = [0; 3];
+                    (node[axis], node[b], node[c]) = (i, ib, ic);
+                    inside(node)
+                };
+                (0..grid.nodes[axis] - 1).filter(|&i| at(i) != at(i + 1)).map(|i| i as f64 + 0.5).collect()
+            })
+        })
+    }
+
+    #[test]
+    fn one_node_inside_is_an_octahedron() {
+        let grid = grid(2.0);
+        let (mesh, reconciled) = extract(&sets_of(&grid, |node| node == [2, 2, 2]), &grid);
+        assert_eq!((mesh.positions.len(), mesh.faces.len()), (6, 8));
+        assert!((mesh.signed_volume() - 1.0 / 6.0).abs() < 1e-12);
+        assert_eq!(reconciled, Reconciled::default());
+    }
+
+    #[test]
+    fn random_sign_fields_are_closed_manifolds() {
+        let mut state = 7;
+        for density in [0.1, 0.3, 0.5, 0.7, 0.9] {
+            for _ in 0..40 {
+                let grid = grid(6.0);
+                let n = grid.nodes;
+                let bits: Vec<bool> = (0..n[0] * n[1] * n[2]).map(|_| random(&mut state) < density).collect();
+                let rim = |p: [usize; 3]| (0..3).any(|a| p[a] == 0 || p[a] == n[a] - 1);
+                let inside = |p: [usize; 3]| !rim(p) && bits[(p[2] * n[1] + p[1]) * n[0] + p[0]];
+                let (mesh, reconciled) = extract(&sets_of(&grid, inside), &grid);
+                assert_closed(&mesh);
+                assert_eq!(reconciled, Reconciled::default());
+            }
+        }
+    }
+
+    /// Families that know nothing of each other: the worst that rounding could do, and far beyond it.
+    #[test]
+    fn contradicting_families_still_give_a_closed_manifold() {
+        let mut state = 11;
+        for _ in 0..100 {
+            let grid = grid(7.0);
+            let sets = [0, 1, 2].map(|axis| {
+                let seed = (random(&mut state) * 1e15) as u64;
+                RaySet::from_rays(axis, &grid, |b, c| {
+                    let mut state = seed + (b * 1000 + c) as u64;
+                    let count = 2 * (random(&mut state) * 4.0) as usize;
+                    let in_box = grid.spans(0, b) && grid.spans(0, c);
+                    let mut ts: Vec<f64> = (0..if in_box { count } else { 0 })
+                        .map(|_| (random(&mut state) * 70.0).round() / 10.0 + 1.5)
+                        .collect();
+                    ts.sort_by(f64::total_cmp);
+                    ts
+                })
+            });
+            assert_closed(&extract(&sets, &grid).0);
+        }
+    }
+
+    #[test]
+    fn noise_on_every_crossing_keeps_the_sphere_closed() {
+        let grid = grid(20.0);
+        let sphere = |axis: usize| {
+            let [b, c] = super::super::cone::ACROSS[axis];
+            RaySet::from_rays(axis, &grid, move |ib, ic| {
+                let mut state = (axis * 10000 + ib * 100 + ic) as u64;
+                let (db, dc) = (ib as f64 - 11.0, ic as f64 - 11.0);
+                let left = 64.0 - db * db - dc * dc;
+                let noise = |state: &mut u64| 2e-6 * (random(state) - 0.5);
+                let _ = (b, c);
+                if left <= 0.0 {
+                    return Vec::new();
+                }
+                vec![11.0 - left.sqrt() + noise(&mut state), 11.0 + left.sqrt() + noise(&mut state)]
+            })
+        };
+        // Radius 8 on a lattice: many crossings fall exactly on nodes before the noise.
+        let (mesh, reconciled) = extract(&[sphere(0), sphere(1), sphere(2)], &grid);
+        assert_closed(&mesh);
+        assert_eq!(mesh.check().unwrap().euler, 2);
+        assert!(reconciled.conflicts > 0);
+    }
+
+    #[test]
+    fn a_comb_thinner_than_a_cell_is_lost_in_pairs() {
+        let grid = grid(8.0);
+        let mut sets = sets_of(&grid, |p| (3..7).contains(&p[0]) && (3..7).contains(&p[1]) && (3..7).contains(&p[2]));
+        sets[2] = RaySet::from_rays(2, &grid, |b, c| {
+            let within = (3..7).contains(&b) && (3..7).contains(&c);
+            if within { vec![2.5, 4.2, 4.4, 4.6, 4.8, 6.5] } else { Vec::new() }
+        });
+        let (mesh, reconciled) = extract(&sets, &grid);
+        assert_closed(&mesh);
+        assert_eq!(reconciled, Reconciled { conflicts: 0, lost_pairs: 32 });
+    }
+}

@@ -17,6 +17,7 @@
 //!   more than a few planes of nodes. The result does not depend on the number of threads.
 
 mod bounds;
+mod choose;
 mod cone;
 mod extract;
 mod grid;
@@ -26,6 +27,7 @@ mod table;
 
 use crate::{GeometryError, Mesh};
 use capture::{Aabb, BinaryMatte, View};
+pub use choose::{HullChoice, HullTrial, choose_hull};
 use cone::Cone;
 use grid::Grid;
 use rayon::prelude::*;
@@ -46,12 +48,16 @@ pub struct HullOptions {
     pub aabb: Option<Aabb>,
     /// How binary mattes are read.
     pub binary: BinaryMatte,
+    /// Parts with less than this fraction of the volume are left out: debris where cones of inexact
+    /// silhouettes graze each other. 0 keeps all.
+    pub least_part: f64,
 }
 
 impl Default for HullOptions {
-    /// Strict intersection of the silhouettes as they are, at automatic resolution in a box to be found.
+    /// Strict intersection of the silhouettes as they are, at automatic resolution in a box to be found,
+    /// without parts below 1e-4 of the volume.
     fn default() -> Self {
-        Self { resolution: None, consensus: 0, grow_px: 0.0, aabb: None, binary: BinaryMatte::Fit }
+        Self { resolution: None, consensus: 0, grow_px: 0.0, aabb: None, binary: BinaryMatte::Fit, least_part: 1e-4 }
     }
 }
 
@@ -87,6 +93,8 @@ pub struct HullReport {
     pub conflicts: usize,
     /// Pairs of crossings within one edge, lost. More than 0.5 % of the crossings asks for a finer grid.
     pub lost_pairs: usize,
+    /// Parts left out for being small.
+    pub small_parts: usize,
     /// Crossings on the walls of the box, lower and upper along x, y, z: where not zero, the box cuts
     /// the hull or the views leave it open there.
     pub wall_crossings: [[usize; 2]; 3],
@@ -123,13 +131,14 @@ pub fn visual_hull(views: &[View], options: &HullOptions) -> Result<Hull, Geomet
     let allowed = options.consensus as u32;
     let aabb = match options.aabb {
         Some(aabb) => aabb,
-        None => bounds::find_box(views, options.binary, allowed)?,
+        None => bounds::find_box(views, options.grow_px, allowed)?,
     };
     let cell = cell_size(views, &aabb, options.resolution);
     let contour_s = start.elapsed().as_secs_f64();
     let mut hull = carve(views, &cones, aabb, cell, allowed)?;
+    let small_parts = hull.mesh.remove_small_parts(options.least_part);
     let report = &mut hull.report;
-    *report = HullReport { unconstrained_views, grow_px: options.grow_px, contour_s, ..*report };
+    *report = HullReport { unconstrained_views, small_parts, grow_px: options.grow_px, contour_s, ..*report };
     Ok(hull)
 }
 
@@ -176,6 +185,10 @@ fn check_options(views: &[View], options: &HullOptions) -> Result<(), GeometryEr
     if !options.grow_px.is_finite() || options.grow_px.abs() > 64.0 {
         let fault = format!("{} is not from -64 to 64", options.grow_px);
         return Err(GeometryError::Options { option: "grow_px", fault, remedy: "half a pixel is usual" });
+    }
+    if !(0.0..0.5).contains(&options.least_part) {
+        let fault = format!("{} is not from 0 to 0.5", options.least_part);
+        return Err(GeometryError::Options { option: "least_part", fault, remedy: "1e-4 drops debris only" });
     }
     let is_box = |b: &Aabb| b.min.iter().chain(b.max.iter()).all(|v| v.is_finite()) && b.size().min() > 0.0;
     if options.aabb.is_some_and(|b| !is_box(&b)) {

@@ -33,6 +33,18 @@ impl RaySet {
         Self { axis, stride: grid.nodes[b], starts, crossings }
     }
 
+    /// Crossings made elsewhere, for tests.
+    #[cfg(test)]
+    pub(super) fn from_rays(axis: usize, grid: &Grid, ray: impl Fn(usize, usize) -> Vec<f64>) -> Self {
+        let [b, c] = ACROSS[axis].map(|a| grid.nodes[a]);
+        let mut set = Self { axis, stride: b, starts: vec![0], crossings: Vec::new() };
+        for index in 0..b * c {
+            set.crossings.extend(ray(index % b, index / b));
+            set.starts.push(set.crossings.len());
+        }
+        set
+    }
+
     /// The crossings of ray (`b`, `c`).
     pub(super) fn ray(&self, b: usize, c: usize) -> &[f64] {
         let index = c * self.stride + b;

@@ -105,6 +105,36 @@ impl Mesh {
         (parts, count as usize)
     }
 
+    /// Removes parts (connected by shared vertices) whose signed volume is below `fraction` of the sum of
+    /// all absolute ones, small cavities too, and says how many. Order is kept; vertices no face uses go.
+    /// Indices must be in range.
+    pub fn remove_small_parts(&mut self, fraction: f64) -> usize {
+        let (parts, count) = self.components();
+        let mut volumes = vec![0.0; count];
+        for (face, &part) in parts.iter().enumerate() {
+            let [a, b, c] = self.corners(face);
+            volumes[part as usize] += a.coords.dot(&b.coords.cross(&c.coords)) / 6.0;
+        }
+        let least = fraction * volumes.iter().map(|v: &f64| v.abs()).sum::<f64>();
+        let is_kept: Vec<bool> = volumes.iter().map(|v| v.abs() >= least).collect();
+        let removed = is_kept.iter().filter(|kept| !**kept).count();
+        if removed > 0 {
+            let mut part_of = parts.iter();
+            self.faces.retain(|_| part_of.next().is_some_and(|&part| is_kept[part as usize]));
+            self.remove_isolated_vertices();
+        }
+        removed
+    }
+
+    fn remove_isolated_vertices(&mut self) {
+        let mut names = vec![u32::MAX; self.positions.len()];
+        self.faces.iter().flatten().for_each(|&v| names[v as usize] = 0);
+        (0u32..).zip(names.iter_mut().filter(|name| **name == 0)).for_each(|(kept, name)| *name = kept);
+        let mut name_of = names.iter();
+        self.positions.retain(|_| name_of.next().is_some_and(|&name| name != u32::MAX));
+        self.faces.iter_mut().flatten().for_each(|v| *v = names[*v as usize]);
+    }
+
     fn degenerate_faces(&self) -> usize {
         let smallest = self.aabb().map_or(0.0, |b| b.diagonal().powi(2)) * 1e-12;
         let is_degenerate =
@@ -221,7 +251,7 @@ fn is_one_fan(link: &[[u32; 2]], scratch: &mut Vec<u32>) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::Point3;
+    use nalgebra::{Point3, Vector3};
 
     fn tetrahedron() -> Mesh {
         let positions =
@@ -278,6 +308,21 @@ mod tests {
         mesh.positions.push(Point3::new(9.0, 9.0, 9.0));
         let check = mesh.check().unwrap();
         assert_eq!((check.degenerate_faces, check.isolated_vertices, check.closed_manifold), (2, 1, false));
+    }
+
+    #[test]
+    fn small_parts_go_and_indices_stay_right() {
+        let mut mesh = Mesh::default();
+        for (scale, shift) in [(0.01, 5.0), (1.0, 0.0), (0.5, 9.0)] {
+            let first = mesh.positions.len() as u32;
+            mesh.positions.extend(tetrahedron().positions.iter().map(|p| p * scale + Vector3::repeat(shift)));
+            mesh.faces.extend(tetrahedron().faces.iter().map(|f| f.map(|v| v + first)));
+        }
+        assert_eq!(mesh.remove_small_parts(1e-4), 1);
+        let check = mesh.check().unwrap();
+        assert!(check.closed_manifold && check.components == 2 && check.isolated_vertices == 0);
+        assert!((check.volume - 1.125 / 6.0).abs() < 1e-12);
+        assert_eq!(mesh.remove_small_parts(0.0), 0);
     }
 
     #[test]
