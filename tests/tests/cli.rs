@@ -227,7 +227,7 @@ fn json_is_all_there_is_on_standard_output() {
         let run = turnlight(place.path(), &[args, &["--json"]].concat());
         assert!(json(&run).is_object(), "{args:?}");
     }
-    assert_eq!(fs::read_dir(place.path().join("frames")).expect("frames").filter(|e| is_png(e)).count(), VIEWS / 2);
+    assert_eq!(fs::read_dir(place.path().join("frames")).expect("frames").filter(is_png).count(), VIEWS / 2);
     assert!(place.path().join("frames/0003.png").exists(), "numbered by position");
     for file in ["report.html", "report.json", "report.csv", "views/dyntex/0001.png", "views/mask/0001.png"] {
         assert!(place.path().join("report").join(file).exists(), "{file}");

@@ -4,10 +4,15 @@ use crate::Error;
 use crate::stages::Stages;
 use capture::{Aabb, View};
 use geometry::hull::{HullOptions, choose_hull, visual_hull};
+use geometry::mesh::io::read_mesh;
 use geometry::{Mesh, SimplifyOptions, TexturedMesh, UnwrapOptions, unwrap_mesh};
 use nalgebra::Point3;
 use std::path::{Path, PathBuf};
 use texture::{Bake, FitOptions, FitReport, Method, Model};
+
+/// Least and largest side of the atlas of a mesh that brings its own.
+const MIN_ATLAS_PX: usize = 64;
+const MAX_ATLAS_PX: usize = 4096;
 
 /// How the shape is made. What is `None` is chosen on the views given.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -92,11 +97,28 @@ fn unwrap(mesh: &Mesh, texel: f64, stages: &mut Stages<'_>) -> Result<TexturedMe
 
 /// A mesh from a file, unfolded unless it comes with a valid atlas.
 fn brought(path: &Path, views: &[View], stages: &mut Stages<'_>) -> Result<TexturedMesh, Error> {
-    let file = stages.run("read mesh", |_| geometry::read_mesh(path))?;
-    match file.uvs {
-        Some(textured) => Ok(textured),
-        None => unwrap(&file.mesh, texel_size(views, &file.mesh)?, stages),
+    let file = stages.run("read mesh", |_| read_mesh(path))?;
+    if let Some(fault) = &file.uv_fault {
+        stages.observer().noted(&format!("{}: its texture coordinates are not used: {fault}", path.display()));
     }
+    let texel = texel_size(views, &file.mesh)?;
+    match file.textured {
+        Some(textured) => Ok(TexturedMesh { atlas_size: atlas_size(&textured, texel), ..textured }),
+        None => unwrap(&file.mesh, texel, stages),
+    }
+}
+
+/// The square atlas in which a texel of a given parametrisation covers `texel` world units in the mean.
+fn atlas_size(mesh: &TexturedMesh, texel: f64) -> [usize; 2] {
+    let (mut surface, mut covered) = (0.0, 0.0);
+    for (face, corners) in mesh.mesh.faces.iter().enumerate() {
+        surface += mesh.mesh.face_area_vector(face).norm();
+        let [a, b, c] = corners.map(|v| mesh.uvs[v as usize]);
+        covered += (b - a).perp(&(c - a)).abs();
+    }
+    let side = (surface / covered).sqrt() / texel;
+    // Not a number where nothing is covered; the cast makes that the least size.
+    [(side.round() as usize).clamp(MIN_ATLAS_PX, MAX_ATLAS_PX); 2]
 }
 
 /// World units that one pixel of the median view covers at the object: a texel for each.

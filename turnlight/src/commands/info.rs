@@ -5,11 +5,12 @@ use crate::Answer;
 use crate::arguments::InfoArgs;
 use serde_json::json;
 use std::path::Path;
+use turnlight::Error;
 use turnlight::capture::{LoadOptions, detect_format, doctor};
+use turnlight::geometry::mesh::io::read_mesh;
 use turnlight::inspect::{self, MeshFacts, ModelFacts};
 use turnlight::stages::{Observer, Stages};
 use turnlight::texture::{self, Model};
-use turnlight::{Error, geometry};
 
 pub(crate) fn run(args: &InfoArgs, observer: &dyn Observer) -> Result<Answer, Error> {
     let extension = args.path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
@@ -21,7 +22,7 @@ pub(crate) fn run(args: &InfoArgs, observer: &dyn Observer) -> Result<Answer, Er
 }
 
 fn mesh(path: &Path) -> Result<Answer, Error> {
-    let facts: MeshFacts = inspect::mesh_facts(&geometry::read_mesh(path)?.mesh)?;
+    let facts: MeshFacts = inspect::mesh_facts(&read_mesh(path)?.mesh)?;
     Ok(Answer { text: facts.text(), json: json!(facts) })
 }
 
