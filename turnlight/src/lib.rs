@@ -1,1 +1,22 @@
-//! turnlight
+//! Image-based modelling from turntable photographs: the whole pipeline, the comparison of methods, and
+//! what the `turnlight` command shares with programs that call the library.
+//!
+//! - [`pipeline`]: views → hull → simplified mesh → atlas → appearance;
+//! - [`evaluate`]: the four methods on held-out views, as JSON, CSV and one HTML page;
+//! - [`inspect`]: what a mesh, a model or a capture holds;
+//! - [`output`]: files and folders that appear whole or not at all;
+//! - [`stages`]: what each stage costs.
+
+mod error;
+pub mod evaluate;
+pub mod inspect;
+pub mod output;
+pub mod pipeline;
+pub mod playback;
+mod selection;
+pub mod stages;
+
+pub use error::Error;
+pub use selection::Selection;
+
+pub use {capture, data_synth, geometry, render, texture};

@@ -1,1 +1,69 @@
-fn main() {}
+//! The `turnlight` command: reads arguments, calls the library, prints what came of it.
+//!
+//! Standard output holds the answer alone (one JSON document with `--json`); progress and faults go to
+//! standard error. Exit code 0 done, 1 the work failed, 2 the arguments are wrong.
+
+mod arguments;
+mod commands;
+mod progress;
+
+use arguments::{Cli, Command};
+use clap::Parser;
+use progress::Progress;
+use std::io::Write;
+use std::process::ExitCode;
+use turnlight::Error;
+
+/// What a command has to say: to a person, and to a program.
+struct Answer {
+    text: String,
+    json: serde_json::Value,
+}
+
+fn main() -> ExitCode {
+    let cli = Cli::parse();
+    match run(&cli) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::from(error.exit_code())
+        }
+    }
+}
+
+fn run(cli: &Cli) -> Result<(), Error> {
+    if let Some(threads) = cli.general.threads {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
+        pool.map_err(|fault| Error::Failed(format!("{threads} threads cannot be started: {fault}; ask for fewer")))?;
+    }
+    let progress = Progress::new(cli.general.quiet, cli.general.verbose);
+    let answer = match &cli.command {
+        Command::Compare(args) => commands::compare::run(args, &progress),
+        Command::Demo(args) => commands::demo::run(args, &progress),
+        Command::Hull(args) => commands::hull::run(args, &progress),
+        Command::Import(args) => commands::import::run(args, &progress),
+        Command::Info(args) => commands::info::run(args, &progress),
+        Command::Model(args) => commands::model::run(args, &progress),
+        Command::Render(args) => commands::render::run(args, &progress),
+        Command::Synth(args) => commands::synth::run(args, &progress),
+    }?;
+    progress.finish();
+    if cli.general.json {
+        print(&format!("{:#}", answer.json))
+    } else if !cli.general.quiet {
+        print(&answer.text)
+    } else {
+        Ok(())
+    }
+}
+
+/// Prints the answer. A reader that has gone away, as `head` does, is no fault.
+fn print(answer: &str) -> Result<(), Error> {
+    let mut out = std::io::stdout().lock();
+    match writeln!(out, "{}", answer.trim_end()).and_then(|()| out.flush()) {
+        Err(fault) if fault.kind() != std::io::ErrorKind::BrokenPipe => {
+            Err(Error::Failed(format!("standard output: {fault}; print elsewhere")))
+        }
+        _ => Ok(()),
+    }
+}

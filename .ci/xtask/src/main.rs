@@ -1,2 +1,72 @@
-//! Chores.
-fn main() {}
+//! Chores, run as `cargo xtask demo` and `cargo xtask test`.
+//!
+//! Both bring what they need: system packages through `apt-get` where it exists, and for the tests a
+//! glTF validator and a Python environment below `target/tools`. What cannot be brought is said, and
+//! the tests that wanted it skip, saying so.
+
+mod packages;
+mod tools;
+
+use anyhow::{Context, Result, bail};
+use std::path::{Path, PathBuf};
+use std::process::{Command, ExitCode};
+
+const USAGE: &str = "usage: cargo xtask demo [ARGS] | test [ARGS]
+  demo   build turnlight and run its demo; ARGS go to `turnlight demo`
+  test   run the whole test suite; ARGS go to `cargo test`";
+
+fn main() -> ExitCode {
+    let args: Vec<String> = std::env::args().skip(1).collect();
+    let outcome = match args.split_first() {
+        Some((chore, rest)) if chore == "demo" => demo(rest),
+        Some((chore, rest)) if chore == "test" => test(rest),
+        _ => {
+            eprintln!("{USAGE}");
+            return ExitCode::from(2);
+        }
+    };
+    match outcome {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("xtask: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// Builds the command alone, and runs its demo in the current folder.
+fn demo(args: &[String]) -> Result<()> {
+    packages::ensure(&[packages::COMPILER])?;
+    let root = root()?;
+    run(cargo(&root).args(["run", "--release", "--package", "turnlight", "--", "demo"]).args(args))
+}
+
+/// Runs every test of the workspace.
+fn test(args: &[String]) -> Result<()> {
+    packages::ensure(&[packages::COMPILER])?;
+    let root = root()?;
+    let tools = tools::prepare(&root);
+    run(cargo(&root).args(["test", "--workspace"]).args(args).envs(tools))
+}
+
+fn cargo(root: &Path) -> Command {
+    let mut command = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
+    command.current_dir(root);
+    command
+}
+
+/// The workspace's folder: two above this crate's.
+fn root() -> Result<PathBuf> {
+    let here = Path::new(env!("CARGO_MANIFEST_DIR"));
+    here.ancestors().nth(2).map(Path::to_path_buf).context("this crate does not lie in .ci/xtask")
+}
+
+/// Runs a command to its end.
+fn run(command: &mut Command) -> Result<()> {
+    let name = command.get_program().to_string_lossy().into_owned();
+    let status = command.status().with_context(|| format!("{name} cannot be started"))?;
+    if !status.success() {
+        bail!("{name} failed ({status})");
+    }
+    Ok(())
+}

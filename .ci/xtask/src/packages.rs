@@ -1,0 +1,62 @@
+//! System packages, installed where they are missing.
+
+use anyhow::{Result, bail};
+use std::process::{Command, Stdio};
+
+/// A program we need, and the Debian packages that bring it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Package {
+    /// What shows that it is there: a command line that succeeds.
+    probe: &'static [&'static str],
+    /// Debian's names.
+    names: &'static [&'static str],
+}
+
+/// Mesh simplification is C++.
+pub(crate) const COMPILER: Package = Package { probe: &["c++", "--version"], names: &["g++"] };
+/// Runs the glTF validator.
+pub(crate) const NODE: Package = Package { probe: &["npm", "--version"], names: &["nodejs", "npm"] };
+/// Runs the referee.
+pub(crate) const PYTHON: Package =
+    Package { probe: &["python3", "-c", "import ensurepip, venv"], names: &["python3", "python3-venv"] };
+
+/// Installs what is missing of `packages`.
+pub(crate) fn ensure(packages: &[Package]) -> Result<()> {
+    let missing: Vec<&str> =
+        packages.iter().filter(|package| !succeeds(package.probe)).flat_map(|p| p.names).copied().collect();
+    if missing.is_empty() {
+        return Ok(());
+    }
+    let names = missing.join(" ");
+    if !succeeds(&["apt-get", "--version"]) {
+        bail!("{names} missing, and there is no apt-get here; install them and run again");
+    }
+    eprintln!("xtask: installing {names}");
+    // The lists of a fresh image are empty or stale.
+    if !(apt(&["update", "-q"]) && apt(&[&["install", "-q", "-y", "--no-install-recommends"], &missing[..]].concat())) {
+        bail!("apt-get could not install {names}; install them and run again");
+    }
+    Ok(())
+}
+
+fn apt(args: &[&str]) -> bool {
+    let is_root = Command::new("id").arg("-u").output().is_ok_and(|id| id.stdout.trim_ascii() == b"0");
+    let mut command = if is_root {
+        Command::new("apt-get")
+    } else {
+        let mut sudo = Command::new("sudo");
+        sudo.arg("apt-get");
+        sudo
+    };
+    // Standard output belongs to the chore.
+    command.args(args).env("DEBIAN_FRONTEND", "noninteractive").stdout(Stdio::null());
+    command.status().is_ok_and(|status| status.success())
+}
+
+/// Whether a command line runs and reports success.
+pub(crate) fn succeeds(line: &[&str]) -> bool {
+    let Some((program, args)) = line.split_first() else { return false };
+    let mut command = Command::new(program);
+    command.args(args).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
+    command.status().is_ok_and(|status| status.success())
+}

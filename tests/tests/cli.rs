@@ -1,0 +1,314 @@
+//! The command as a stranger meets it: exit codes, messages, purity of standard output, output that
+//! appears whole or not at all, the same bytes from every run.
+
+use serde_json::Value;
+use std::fs;
+use std::path::Path;
+use tests::{Run, small_capture, turnlight};
+
+const VIEWS: usize = 8;
+
+/// A folder with a small capture in it.
+fn place() -> tempfile::TempDir {
+    let place = tempfile::tempdir().expect("a folder");
+    small_capture(place.path(), VIEWS);
+    place
+}
+
+/// The work failed: code 1, one or two lines that say all of `words`, nothing on standard output, and
+/// nothing left behind but what was there.
+fn assert_fails(place: &Path, args: &[&str], words: &[&str]) {
+    let before = listing(place);
+    let run = turnlight(place, &[args, &["--quiet"]].concat());
+    assert_eq!(run.code, Some(1), "{args:?}: {}", run.stderr);
+    assert!(run.stdout.is_empty(), "{args:?} printed {}", run.stdout);
+    assert!((1..=2).contains(&run.stderr.trim_end().lines().count()), "{args:?}: {}", run.stderr);
+    for word in words {
+        assert!(run.stderr.contains(word), "{args:?} does not say '{word}': {}", run.stderr);
+    }
+    assert_eq!(listing(place), before, "{args:?} left something behind");
+}
+
+fn listing(place: &Path) -> Vec<String> {
+    let mut names: Vec<String> = fs::read_dir(place)
+        .expect("a folder")
+        .map(|e| e.expect("an entry").file_name().to_string_lossy().into_owned())
+        .collect();
+    names.sort_unstable();
+    names
+}
+
+fn edit(place: &Path, change: impl FnOnce(&mut Value)) {
+    let path = place.join("capture/transforms.json");
+    let mut file: Value = serde_json::from_str(&fs::read_to_string(&path).expect("a file")).expect("JSON");
+    change(&mut file);
+    fs::write(path, file.to_string()).expect("written");
+}
+
+/// The file below `capture/` that `key` of a frame names.
+fn frame_file(place: &Path, key: &str, frame: usize) -> std::path::PathBuf {
+    let text = fs::read_to_string(place.join("capture/transforms.json")).expect("a file");
+    let file: Value = serde_json::from_str(&text).expect("JSON");
+    place.join("capture").join(file["frames"][frame][key].as_str().expect("a path"))
+}
+
+fn json(run: &Run) -> Value {
+    assert_eq!(run.code, Some(0), "{}", run.stderr);
+    serde_json::from_str(&run.stdout).unwrap_or_else(|e| panic!("{e} in {}", run.stdout))
+}
+
+#[test]
+fn wrong_arguments_return_2() {
+    let place = place();
+    for args in [
+        &["nonsense"][..],
+        &["model"],
+        &["model", "capture"],
+        &["model", "capture", "-o", "x.glb", "--views", "even,odd"],
+        &["model", "capture", "-o", "x.glb", "--views", "99"],
+        &["model", "capture", "-o", "x.obj"],
+        &["model", "capture", "-o", "x.glb", "--threads", "0"],
+        &["model", "capture", "-o", "x.glb", "--method", "magic"],
+        &["model", "capture", "-o", "x.glb", "--mesh", "m.ply", "--resolution", "64"],
+        &["hull", "capture", "-o", "x.stl"],
+        &["hull", "capture", "-o", "x.ply", "--grow", "nan"],
+        &["hull", "capture", "-o", "x.ply", "--downscale", "0"],
+        &["compare", "capture", "--train", "0,1", "--test", "0,1"],
+        &["render", "x.glb"],
+        &["synth", "temple", "-o", "s", "--size", "10"],
+        &["synth", "unheard-of", "-o", "s"],
+        &["info", "capture", "--quiet", "-v"],
+    ] {
+        let run = turnlight(place.path(), args);
+        assert_eq!(run.code, Some(2), "{args:?}: {}", run.stderr);
+        assert!(run.stdout.is_empty() && !run.stderr.is_empty(), "{args:?}");
+    }
+    assert_eq!(listing(place.path()), ["capture"]);
+}
+
+#[test]
+fn help_and_version_return_0() {
+    for args in [&["--help"][..], &["--version"], &["model", "--help"], &["help", "compare"]] {
+        let run = turnlight(Path::new("."), args);
+        assert_eq!((run.code, run.stderr.as_str()), (Some(0), ""), "{args:?}");
+    }
+}
+
+#[test]
+fn broken_files_are_named() {
+    let place = place();
+    let model: &[&str] = &["model", "capture", "-o", "m.glb"];
+    let image = frame_file(place.path(), "file_path", 2);
+    let mask = frame_file(place.path(), "mask_path", 3);
+    let name = |path: &Path| path.file_name().expect("a name").to_string_lossy().into_owned();
+    let (image_bytes, mask_bytes) = (fs::read(&image).expect("an image"), fs::read(&mask).expect("a mask"));
+
+    fs::remove_file(&image).expect("removed");
+    assert_fails(place.path(), model, &[&name(&image)]);
+    fs::write(&image, &image_bytes[..image_bytes.len() / 2]).expect("written");
+    assert_fails(place.path(), model, &[&name(&image)]);
+    fs::write(&image, &image_bytes).expect("written");
+
+    capture::write_matte(&mask, &capture::Image::filled(50, 40, 255)).expect("written");
+    assert_fails(place.path(), model, &[&name(&mask), "50"]);
+    capture::write_matte(&mask, &capture::Image::filled(96, 72, 0)).expect("written");
+    assert_fails(place.path(), model, &[&name(&mask), "empty"]);
+    fs::write(&mask, &mask_bytes).expect("written");
+
+    fs::create_dir(place.path().join("nothing")).expect("a folder");
+    fs::write(place.path().join("nothing/notes.txt"), "x").expect("written");
+    for args in [&["model", "nothing", "-o", "m.glb"][..], &["info", "nothing"], &["compare", "nothing", "-o", "r"]] {
+        assert_fails(place.path(), args, &["nothing"]);
+    }
+    assert_fails(place.path(), &["info", "not-there"], &["not-there"]);
+    assert_fails(place.path(), &["render", "not-there.glb", "--turntable", "2", "-o", "r"], &["not-there.glb"]);
+}
+
+#[test]
+fn broken_cameras_are_named() {
+    for (word, matrix) in [
+        ("transforms.json", r#"[["NaN",0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]"#),
+        ("transforms.json", "[[1e999,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]"),
+        ("rotation", "[[3,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]"),
+        ("transforms.json", "[[1,0,0],[0,1,0]]"),
+    ] {
+        let place = place();
+        let path = place.path().join("capture/transforms.json");
+        edit(place.path(), |file| file["frames"][1]["transform_matrix"] = "HERE".into());
+        let text = fs::read_to_string(&path).expect("a file").replace("\"HERE\"", matrix);
+        fs::write(&path, text).expect("written");
+        assert_fails(place.path(), &["model", "capture", "-o", "m.glb"], &["transforms.json", word]);
+    }
+}
+
+#[test]
+fn views_that_make_no_shape_are_refused() {
+    let place = place();
+    assert_fails(place.path(), &["model", "capture", "-o", "m.glb", "--views", "0"], &[]);
+    // A silhouette in the wrong corner of every view: nothing is common to them.
+    for i in 0..VIEWS {
+        let mut matte = capture::Image::filled(96, 72, 0);
+        let corner = [(4, 4), (88, 4), (4, 64), (88, 64)][i % 4];
+        (0..4).for_each(|k| matte.set(corner.0 + k, corner.1 + k, 255));
+        capture::write_matte(&frame_file(place.path(), "mask_path", i), &matte).expect("written");
+    }
+    assert_fails(place.path(), &["hull", "capture", "-o", "m.ply", "--consensus", "0"], &[]);
+}
+
+#[test]
+fn two_identical_views_are_as_good_as_one() {
+    let place = place();
+    edit(place.path(), |file| {
+        let first = file["frames"][0].clone();
+        file["frames"].as_array_mut().expect("frames").insert(1, first);
+    });
+    let run = turnlight(place.path(), &["model", "capture", "-o", "m.glb", "--json"]);
+    assert_eq!(json(&run)["views"], VIEWS + 1);
+}
+
+#[test]
+fn outputs_that_cannot_be_written_leave_nothing() {
+    let place = place();
+    assert_fails(place.path(), &["hull", "capture", "-o", "none/h.ply"], &["none"]);
+    fs::create_dir(place.path().join("mine")).expect("a folder");
+    fs::write(place.path().join("mine/thesis.tex"), "x").expect("written");
+    assert_fails(place.path(), &["compare", "capture", "-o", "mine"], &["mine"]);
+    assert_fails(place.path(), &["demo", "-o", "mine"], &["mine"]);
+    assert_fails(place.path(), &["import", "capture", "-o", "mine"], &["mine"]);
+    assert_fails(place.path(), &["synth", "temple", "-o", "mine", "--views", "1", "--size", "8x8"], &["mine"]);
+    assert_eq!(fs::read_to_string(place.path().join("mine/thesis.tex")).expect("still there"), "x");
+}
+
+/// Needs the right to mount: skips, saying so, without it.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_disk_is_named_and_leaves_nothing() {
+    let place = place();
+    let disk = place.path().join("disk");
+    fs::create_dir(&disk).expect("a folder");
+    let mount =
+        std::process::Command::new("mount").args(["-t", "tmpfs", "-o", "size=32k", "tmpfs"]).arg(&disk).output();
+    if !mount.is_ok_and(|output| output.status.success()) {
+        eprintln!("skipped: a small file system cannot be mounted here");
+        return;
+    }
+    let runs = [
+        &["model", "capture", "-o", "disk/m.glb"][..],
+        &["hull", "capture", "-o", "disk/h.ply"],
+        &["import", "capture", "-o", "disk/c"],
+        &["compare", "capture", "-o", "disk/r", "--method", "static"],
+        &["synth", "temple", "-o", "disk/s", "--views", "4", "--size", "96x72"],
+    ]
+    .map(|args| (args, turnlight(place.path(), &[args, &["--quiet"]].concat()), listing(&disk)));
+    let unmounted = std::process::Command::new("umount").arg(&disk).status();
+    assert!(unmounted.is_ok_and(|status| status.success()), "{} is still mounted", disk.display());
+    for (args, run, left) in runs {
+        assert_eq!(run.code, Some(1), "{args:?}: {}", run.stderr);
+        assert!(run.stderr.contains("disk"), "{args:?}: {}", run.stderr);
+        assert!(left.is_empty(), "{args:?} left {left:?}");
+    }
+}
+
+#[test]
+fn json_is_all_there_is_on_standard_output() {
+    let place = place();
+    for args in [
+        &["info", "capture"][..],
+        &["import", "capture", "-o", "imported"],
+        &["hull", "capture", "-o", "hull.ply"],
+        &["info", "hull.ply"],
+        &["model", "capture", "-o", "m.glb"],
+        &["info", "m.glb"],
+        &["render", "m.glb", "--cameras", "capture", "--views", "odd", "-o", "frames"],
+        &["render", "m.glb", "--turntable", "3", "--size", "32x24", "--video", "film.png"],
+        &["compare", "capture", "-o", "report", "-v"],
+        &["synth", "temple", "-o", "filmed", "--views", "2", "--size", "16x12"],
+    ] {
+        let run = turnlight(place.path(), &[args, &["--json"]].concat());
+        assert!(json(&run).is_object(), "{args:?}");
+    }
+    assert_eq!(fs::read_dir(place.path().join("frames")).expect("frames").filter(is_png).count(), VIEWS / 2);
+    assert!(place.path().join("frames/0003.png").exists(), "numbered by position");
+    for file in ["report.html", "report.json", "report.csv", "views/dyntex/0001.png", "views/mask/0001.png"] {
+        assert!(place.path().join("report").join(file).exists(), "{file}");
+    }
+    let quiet = turnlight(place.path(), &["info", "hull.ply", "--quiet"]);
+    assert_eq!((quiet.code, quiet.stdout.as_str(), quiet.stderr.as_str()), (Some(0), "", ""));
+}
+
+fn is_png(entry: &std::io::Result<fs::DirEntry>) -> bool {
+    entry.as_ref().is_ok_and(|e| e.path().extension().is_some_and(|x| x == "png"))
+}
+
+#[test]
+fn reports_have_the_keys_of_the_contract() {
+    let place = place();
+    let hull = json(&turnlight(place.path(), &["hull", "capture", "-o", "h.ply", "--json"]));
+    let mesh = json(&turnlight(place.path(), &["info", "h.ply", "--json"]));
+    for key in ["vertices", "triangles", "components", "euler", "closed_manifold", "volume", "aabb"] {
+        assert_eq!(hull[key].is_null(), mesh[key].is_null(), "{key}");
+        assert!(!mesh[key].is_null(), "{key}");
+    }
+    let compared = json(&turnlight(place.path(), &["compare", "capture", "--json"]));
+    assert_eq!(compared["capture"], "capture");
+    assert_eq!(compared["train"], serde_json::json!([0, 2, 4, 6]));
+    assert_eq!(compared["test"], serde_json::json!([1, 3, 5, 7]));
+    let stage = &compared["stages"][0];
+    assert!(stage["stage"].is_string() && stage["seconds"].is_number() && stage.get("peak_bytes").is_some());
+    let names: Vec<&Value> = compared["methods"].as_array().expect("methods").iter().map(|m| &m["method"]).collect();
+    assert_eq!(names, ["static", "vdtm", "lumigraph", "dyntex"]);
+    for key in [
+        "error_mean_pct",
+        "error_max_pct",
+        "error_variance",
+        "error_union_pct",
+        "psnr_db",
+        "ssim",
+        "psnr_full_db",
+        "mask_iou",
+        "seam",
+        "temporal",
+        "bytes",
+        "bytes_raw",
+        "build_s",
+        "frame_ms",
+    ] {
+        assert!(compared["methods"][3][key].is_number(), "{key}");
+    }
+    turnlight(place.path(), &["model", "capture", "-o", "m.glb"]);
+    let model = json(&turnlight(place.path(), &["info", "m.glb", "--json"]));
+    assert_eq!(model["method"], "dyntex");
+    assert!(model["facets"].is_number() && model["ranks"].is_array() && model["bytes"]["appearance"].is_number());
+    assert_eq!(model["bytes"]["file"], fs::metadata(place.path().join("m.glb")).expect("a model").len());
+}
+
+#[test]
+fn the_same_bytes_from_every_run() {
+    let place = place();
+    let mut models = Vec::new();
+    for (file, threads) in [("a.glb", "1"), ("b.glb", "2"), ("c.glb", "2")] {
+        let run = turnlight(place.path(), &["model", "capture", "-o", file, "--threads", threads, "--quiet"]);
+        assert_eq!(run.code, Some(0), "{}", run.stderr);
+        models.push(fs::read(place.path().join(file)).expect("a model"));
+    }
+    assert!(models[0] == models[1], "one thread and two differ");
+    assert!(models[1] == models[2], "two runs differ");
+    for (folder, threads) in [("fa", "1"), ("fb", "2")] {
+        let args = ["render", "a.glb", "--cameras", "capture", "--views", "3", "-o", folder, "--threads", threads];
+        assert_eq!(turnlight(place.path(), &args).code, Some(0));
+    }
+    let frame = |folder: &str| fs::read(place.path().join(folder).join("0003.png")).expect("a frame");
+    assert!(frame("fa") == frame("fb"), "renders differ");
+}
+
+#[test]
+fn a_second_run_replaces_the_first() {
+    let place = place();
+    for _ in 0..2 {
+        let run = turnlight(place.path(), &["compare", "capture", "-o", "report", "--method", "static", "--quiet"]);
+        assert_eq!(run.code, Some(0), "{}", run.stderr);
+        let run = turnlight(place.path(), &["import", "capture", "-o", "imported", "--quiet"]);
+        assert_eq!(run.code, Some(0), "{}", run.stderr);
+    }
+    assert_eq!(listing(place.path()), ["capture", "imported", "report"]);
+}

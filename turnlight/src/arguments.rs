@@ -1,0 +1,354 @@
+//! Every flag of the command, once.
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use std::path::PathBuf;
+use turnlight::Selection;
+
+/// Turns photographs of an object on a turntable into one that can be played back from any direction.
+#[derive(Debug, Parser)]
+#[command(version, propagate_version = true)]
+pub(crate) struct Cli {
+    #[command(flatten)]
+    pub(crate) general: General,
+    #[command(subcommand)]
+    pub(crate) command: Command,
+}
+
+/// What every command takes.
+#[derive(Debug, Args)]
+pub(crate) struct General {
+    /// Print one JSON document on standard output, and nothing else there
+    #[arg(long, global = true)]
+    pub(crate) json: bool,
+    /// Say nothing but errors
+    #[arg(short, long, global = true, conflicts_with = "verbose")]
+    pub(crate) quiet: bool,
+    /// Say more
+    #[arg(short, long, global = true, action = clap::ArgAction::Count)]
+    pub(crate) verbose: u8,
+    /// Use this many threads [default: one per core]
+    #[arg(long, global = true, value_name = "N", value_parser = threads)]
+    pub(crate) threads: Option<usize>,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    /// Compare the four methods on held-out views: table, plot, crops
+    Compare(CompareArgs),
+    /// Film a synthetic object, model it, compare the methods
+    Demo(DemoArgs),
+    /// Make the visual hull alone (.ply .obj .glb)
+    Hull(HullArgs),
+    /// Bring a calibrated folder of any known kind into our own
+    Import(ImportArgs),
+    /// Say what a capture, a mesh or a model holds, and check it
+    Info(InfoArgs),
+    /// Make a model: hull, atlas, appearance
+    Model(ModelArgs),
+    /// Draw a model: a picture per camera, a turntable, a film
+    Render(RenderArgs),
+    /// Render a synthetic capture whose truth is known
+    Synth(SynthArgs),
+}
+
+/// A calibrated folder and how it is read.
+#[derive(Clone, Debug, Args)]
+pub(crate) struct CaptureArgs {
+    /// A calibrated folder of any known kind
+    pub(crate) capture: PathBuf,
+    #[command(flatten)]
+    pub(crate) load: LoadArgs,
+}
+
+/// How views are read.
+#[derive(Clone, Debug, Args)]
+pub(crate) struct LoadArgs {
+    /// Reduce images by this whole factor
+    #[arg(long, value_name = "N", default_value = "1", value_parser = whole_factor)]
+    pub(crate) downscale: usize,
+    /// Find silhouettes in the photographs even where masks are given
+    #[arg(long)]
+    pub(crate) ignore_masks: bool,
+}
+
+/// How the shape is made.
+#[derive(Clone, Debug, Args)]
+pub(crate) struct ShapeArgs {
+    /// Grid cells along the object's longest side, or auto: one to two pixels a cell
+    #[arg(long, value_name = "N", default_value = "auto", value_parser = resolution)]
+    pub(crate) resolution: Auto<usize>,
+    /// Forgive this many silhouettes that cut where all others do not; auto: chosen on the views
+    #[arg(long, value_name = "K", default_value = "auto", value_parser = consensus)]
+    pub(crate) consensus: Auto<usize>,
+    /// Grow silhouettes by this many pixels before carving; auto: chosen on the views
+    #[arg(long, value_name = "PX", default_value = "auto", value_parser = grow, allow_negative_numbers = true)]
+    pub(crate) grow: Auto<f64>,
+}
+
+/// How the mesh gets its atlas.
+#[derive(Clone, Debug, Args)]
+pub(crate) struct MeshArgs {
+    #[command(flatten)]
+    pub(crate) shape: ShapeArgs,
+    /// Bring a mesh instead of making the hull (.obj .ply .glb); its texture coordinates are kept if valid
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["resolution", "consensus", "grow"])]
+    pub(crate) mesh: Option<PathBuf>,
+}
+
+/// How the appearance is fitted.
+#[derive(Clone, Debug, Args)]
+pub(crate) struct FitArgs {
+    /// Texture layers a texel may hold, source views of VDTM, rays of the lumigraph
+    #[arg(long, value_name = "N", value_parser = whole_factor)]
+    pub(crate) layers: Option<usize>,
+    /// Take this many pixels off every silhouette before its colours are used
+    #[arg(long, value_name = "PX", value_parser = pixels)]
+    pub(crate) mask_erode: Option<f64>,
+}
+
+/// The appearances.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum MethodArg {
+    /// A linear basis per facet
+    Dyntex,
+    /// One texture for all views
+    Static,
+    /// View-dependent texture mapping
+    Vdtm,
+    /// Unstructured lumigraph
+    Lumigraph,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct CompareArgs {
+    #[command(flatten)]
+    pub(crate) capture: CaptureArgs,
+    /// Where the report goes: report.html, report.json, report.csv, views/
+    #[arg(short, long, value_name = "REPORT")]
+    pub(crate) output: Option<PathBuf>,
+    /// Views to fit: all, even, odd, every:K, or a list like 0,4,9-12
+    #[arg(long, default_value = "even")]
+    pub(crate) train: Selection,
+    /// Views to score; those fitted or within 2° of one are left out
+    #[arg(long, default_value = "odd")]
+    pub(crate) test: Selection,
+    /// Methods to compare, comma-separated
+    #[arg(long, value_enum, value_delimiter = ',', default_values = ["static", "vdtm", "lumigraph", "dyntex"])]
+    pub(crate) method: Vec<MethodArg>,
+    #[command(flatten)]
+    pub(crate) mesh: MeshArgs,
+    #[command(flatten)]
+    pub(crate) fit: FitArgs,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct DemoArgs {
+    /// Where everything goes
+    #[arg(short, long, value_name = "DIR", default_value = "turnlight-demo")]
+    pub(crate) output: PathBuf,
+    /// Seed of the synthetic object
+    #[arg(long, default_value = "1")]
+    pub(crate) seed: u64,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct HullArgs {
+    #[command(flatten)]
+    pub(crate) capture: CaptureArgs,
+    /// The mesh to write (.ply .obj .glb)
+    #[arg(short, long, value_name = "MESH")]
+    pub(crate) output: PathBuf,
+    /// Views to use: all, even, odd, every:K, or a list like 0,4,9-12
+    #[arg(long, default_value = "all")]
+    pub(crate) views: Selection,
+    #[command(flatten)]
+    pub(crate) shape: ShapeArgs,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct ImportArgs {
+    /// nerfstudio, instant-ngp, original NeRF, COLMAP (text, binary), Middlebury, projection matrices (text, .mat)
+    pub(crate) path: PathBuf,
+    /// The capture to write
+    #[arg(short, long, value_name = "CAPTURE")]
+    pub(crate) output: PathBuf,
+    /// Find silhouettes in the photographs even where masks are given
+    #[arg(long)]
+    pub(crate) ignore_masks: bool,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct InfoArgs {
+    /// A capture, a mesh (.ply .obj .glb) or a model
+    pub(crate) path: PathBuf,
+    /// Find silhouettes in the photographs even where masks are given
+    #[arg(long)]
+    pub(crate) ignore_masks: bool,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct ModelArgs {
+    #[command(flatten)]
+    pub(crate) capture: CaptureArgs,
+    /// The model to write (.glb)
+    #[arg(short, long, value_name = "MODEL.glb")]
+    pub(crate) output: PathBuf,
+    /// Views to use: all, even, odd, every:K, or a list like 0,4,9-12
+    #[arg(long, default_value = "all")]
+    pub(crate) views: Selection,
+    /// The appearance
+    #[arg(long, value_enum, default_value = "dyntex")]
+    pub(crate) method: MethodArg,
+    #[command(flatten)]
+    pub(crate) mesh: MeshArgs,
+    #[command(flatten)]
+    pub(crate) fit: FitArgs,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct RenderArgs {
+    /// The model to draw
+    pub(crate) model: PathBuf,
+    /// Draw with the cameras of this capture; with --turntable, continue its orbit
+    #[arg(long, value_name = "CAPTURE")]
+    pub(crate) cameras: Option<PathBuf>,
+    /// Cameras to use: all, even, odd, every:K, or a list like 0,4,9-12
+    #[arg(long, default_value = "all", requires = "cameras")]
+    pub(crate) views: Selection,
+    /// Draw one turn of this many frames
+    #[arg(long, value_name = "N", value_parser = frames)]
+    pub(crate) turntable: Option<usize>,
+    /// Where the pictures go, one PNG per camera
+    #[arg(short, long, value_name = "DIR", required_unless_present = "video")]
+    pub(crate) output: Option<PathBuf>,
+    /// Write a film (.png .apng: an animated PNG)
+    #[arg(long, value_name = "FILE")]
+    pub(crate) video: Option<PathBuf>,
+    /// Frames per second of the film
+    #[arg(long, value_name = "N", default_value = "24", value_parser = rate)]
+    pub(crate) fps: f64,
+    /// Size of the frames, where no camera gives it
+    #[arg(long, value_name = "WxH", value_parser = size)]
+    pub(crate) size: Option<[usize; 2]>,
+    /// Axis of the turntable, where no capture gives it: x, y, z, -x, -y, -z
+    #[arg(long, default_value = "z", value_parser = axis, allow_hyphen_values = true)]
+    pub(crate) up: [f64; 3],
+    /// Reduce the frames by this whole factor
+    #[arg(long, value_name = "N", default_value = "1", value_parser = whole_factor)]
+    pub(crate) downscale: usize,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct SynthArgs {
+    /// The scene
+    pub(crate) scene: String,
+    /// The capture to write
+    #[arg(short, long, value_name = "DIR")]
+    pub(crate) output: PathBuf,
+    /// Number of views
+    #[arg(long, value_name = "N", default_value = "48", value_parser = frames)]
+    pub(crate) views: usize,
+    /// Size of the frames
+    #[arg(long, value_name = "WxH", default_value = "640x480", value_parser = size)]
+    pub(crate) size: [usize; 2],
+    /// Seed of everything random
+    #[arg(long, default_value = "1")]
+    pub(crate) seed: u64,
+    /// Write the frames as a film too (.png .apng: an animated PNG)
+    #[arg(long, value_name = "FILE")]
+    pub(crate) video: Option<PathBuf>,
+}
+
+/// A value, or left to us.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Auto<T>(pub(crate) Option<T>);
+
+fn resolution(text: &str) -> Result<Auto<usize>, String> {
+    auto(text, |text| bounded(text, 4096))
+}
+
+fn consensus(text: &str) -> Result<Auto<usize>, String> {
+    auto(text, |text| text.parse().map_err(|fault| format!("needs a number of views or auto: {fault}")))
+}
+
+fn grow(text: &str) -> Result<Auto<f64>, String> {
+    auto(text, |text| within(text, -64.0, 64.0))
+}
+
+fn auto<T>(text: &str, parse: impl Fn(&str) -> Result<T, String>) -> Result<Auto<T>, String> {
+    if text == "auto" { Ok(Auto(None)) } else { parse(text).map(|value| Auto(Some(value))) }
+}
+
+fn bounded(text: &str, most: usize) -> Result<usize, String> {
+    match text.parse() {
+        Ok(value) if (1..=most).contains(&value) => Ok(value),
+        _ => Err(format!("needs a whole number from 1 to {most}")),
+    }
+}
+
+fn threads(text: &str) -> Result<usize, String> {
+    bounded(text, 1024)
+}
+
+fn whole_factor(text: &str) -> Result<usize, String> {
+    bounded(text, 256)
+}
+
+fn frames(text: &str) -> Result<usize, String> {
+    bounded(text, 100_000)
+}
+
+fn size(text: &str) -> Result<[usize; 2], String> {
+    let (width, height) = text.split_once(['x', 'X', '×']).ok_or("needs WIDTHxHEIGHT, as in 640x480")?;
+    Ok([bounded(width, 1 << 14)?, bounded(height, 1 << 14)?])
+}
+
+fn pixels(text: &str) -> Result<f64, String> {
+    within(text, 0.0, 1000.0)
+}
+
+fn rate(text: &str) -> Result<f64, String> {
+    within(text, 0.02, 650.0)
+}
+
+fn within(text: &str, least: f64, most: f64) -> Result<f64, String> {
+    match text.parse() {
+        Ok(value) if (least..=most).contains(&value) => Ok(value),
+        _ => Err(format!("needs a number from {least} to {most}")),
+    }
+}
+
+fn axis(text: &str) -> Result<[f64; 3], String> {
+    let (sign, name) = text.strip_prefix('-').map_or((1.0, text), |name| (-1.0, name));
+    match name {
+        "x" => Ok([sign, 0.0, 0.0]),
+        "y" => Ok([0.0, sign, 0.0]),
+        "z" => Ok([0.0, 0.0, sign]),
+        _ => Err("needs x, y, z, -x, -y or -z".to_owned()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn values_out_of_range_are_refused() {
+        for text in ["nan", "inf", "1e9", "", "x"] {
+            assert!(grow(text).is_err(), "{text}");
+        }
+        assert_eq!(grow("auto"), Ok(Auto(None)));
+        assert_eq!(grow("-0.5"), Ok(Auto(Some(-0.5))));
+        assert_eq!(size("640x480"), Ok([640, 480]));
+        for text in ["640", "0x5", "5x0", "99999x99999", "axb"] {
+            assert!(size(text).is_err(), "{text}");
+        }
+        assert_eq!(axis("-y"), Ok([0.0, -1.0, 0.0]));
+    }
+}

@@ -1,0 +1,48 @@
+//! `turnlight synth`
+
+use crate::Answer;
+use crate::arguments::SynthArgs;
+use serde_json::json;
+use turnlight::Error;
+use turnlight::data_synth::{Scene, SynthCapture, SynthOptions, synthesize_with};
+use turnlight::render::film::write_film;
+use turnlight::stages::{Observer, Stages};
+
+/// Frames per second of the film.
+const FPS: f64 = 12.0;
+
+pub(crate) fn run(args: &SynthArgs, observer: &dyn Observer) -> Result<Answer, Error> {
+    let scene: Scene = args.scene.parse().map_err(|fault| Error::Arguments(format!("{fault}")))?;
+    let [width, height] = args.size;
+    let options = SynthOptions { views: args.views, width, height, seed: args.seed, ..SynthOptions::default() };
+    let mut stages = Stages::new(observer);
+    let filmed = film(scene, &options, &mut stages)?;
+    stages.run("write", |_| filmed.write(&args.output))?;
+    if let Some(video) = &args.video {
+        let frames: Vec<_> = filmed.views.iter().map(|v| v.image.map(|[r, g, b]| [r, g, b, 255])).collect();
+        stages.run("write film", |_| write_film(video, frames, FPS))?;
+    }
+    let mut text =
+        format!("{}: {} views of {width} × {height}\nwrote {}", scene.name(), args.views, args.output.display());
+    if let Some(video) = &args.video {
+        text.push_str(&format!("\nwrote {}", video.display()));
+    }
+    let json = json!({
+        "scene": scene.name(),
+        "views": args.views,
+        "width": width,
+        "height": height,
+        "seed": args.seed,
+        "noise_rms": filmed.report.noise_rms,
+        "capture": args.output,
+        "video": args.video,
+        "stages": stages.finished(),
+    });
+    Ok(Answer { text, json })
+}
+
+/// Films a scene as a stage.
+pub(super) fn film(scene: Scene, options: &SynthOptions, stages: &mut Stages<'_>) -> Result<SynthCapture, Error> {
+    let film = |observer: &dyn Observer| synthesize_with(scene, options, |done, total| observer.advanced(done, total));
+    Ok(stages.run("film", film)?)
+}
