@@ -10,6 +10,10 @@ use nalgebra::Point3;
 use std::path::{Path, PathBuf};
 use texture::{Bake, FitOptions, FitReport, Method, Model};
 
+/// Room given around the object's box, as a share of its size: without any, the hull of the temple ring
+/// covers 95.6 % of its silhouettes, with it 97.1 %.
+const BOX_MARGIN: f64 = 0.05;
+
 /// Least and largest side of the atlas of a mesh that brings its own.
 const MIN_ATLAS_PX: usize = 64;
 const MAX_ATLAS_PX: usize = 4096;
@@ -73,7 +77,7 @@ pub fn hull(
     options: &ShapeOptions,
     stages: &mut Stages<'_>,
 ) -> Result<Mesh, Error> {
-    let base = HullOptions { resolution: options.resolution, aabb, ..HullOptions::default() };
+    let base = HullOptions { resolution: options.resolution, aabb: aabb.map(roomy), ..HullOptions::default() };
     let chosen = match (options.consensus, options.grow_px) {
         (Some(consensus), Some(grow_px)) => HullOptions { consensus, grow_px, ..base },
         (consensus, grow_px) => {
@@ -84,6 +88,12 @@ pub fn hull(
         }
     };
     Ok(stages.run("hull", |_| visual_hull(views, &chosen))?.mesh)
+}
+
+/// A published box is tight around the true surface, or tighter; the hull of real silhouettes is cut by it.
+fn roomy(aabb: Aabb) -> Aabb {
+    let margin = aabb.size() * BOX_MARGIN;
+    Aabb { min: aabb.min - margin, max: aabb.max + margin }
 }
 
 /// A hull at one to two pixels a cell holds many more triangles than its silhouettes need.
