@@ -144,7 +144,7 @@ fn broken_cameras_are_named() {
 #[test]
 fn views_that_make_no_shape_are_refused() {
     let place = place();
-    assert_fails(place.path(), &["model", "capture", "-o", "m.glb", "--views", "0"], &[]);
+    assert_fails(place.path(), &["model", "capture", "-o", "m.glb", "--views", "0"], &["one place", "views"]);
     // A silhouette in the wrong corner of every view: nothing is common to them.
     for i in 0..VIEWS {
         let mut matte = capture::Image::filled(96, 72, 0);
@@ -164,6 +164,7 @@ fn two_identical_views_are_as_good_as_one() {
     });
     let run = turnlight(place.path(), &["model", "capture", "-o", "m.glb", "--json"]);
     assert_eq!(json(&run)["views"], VIEWS + 1);
+    assert_fails(place.path(), &["model", "capture", "-o", "n.glb", "--views", "0,1"], &["one place"]);
 }
 
 #[test]

@@ -73,6 +73,7 @@ pub fn hull(
     options: &ShapeOptions,
     stages: &mut Stages<'_>,
 ) -> Result<Mesh, Error> {
+    refuse_one_place(views)?;
     let base = HullOptions { resolution: options.resolution, aabb, ..HullOptions::default() };
     let chosen = match (options.consensus, options.grow_px) {
         (Some(consensus), Some(grow_px)) => HullOptions { consensus, grow_px, ..base },
@@ -84,6 +85,18 @@ pub fn hull(
         }
     };
     Ok(stages.run("hull", |_| visual_hull(views, &chosen))?.mesh)
+}
+
+/// Silhouettes from one place leave the depth open, which a box of the object would only hide.
+fn refuse_one_place(views: &[View]) -> Result<(), Error> {
+    let first = views.first().map(|view| view.camera.center());
+    let is_first =
+        |view: &View| first.is_some_and(|first| (view.camera.center() - first).norm() <= 1e-6 * first.coords.norm());
+    if views.iter().all(is_first) {
+        let fault = format!("{} views from one place do not determine a shape", views.len());
+        return Err(Error::Failed(format!("{fault}; add views from other sides, or bring a mesh with --mesh")));
+    }
+    Ok(())
 }
 
 /// A hull at one to two pixels a cell holds many more triangles than its silhouettes need.
