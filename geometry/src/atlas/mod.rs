@@ -15,6 +15,7 @@ mod place;
 mod texels;
 
 pub use gutter::PushPull;
+pub(crate) use texels::overlapping_texels;
 pub use texels::{AtlasTexel, AtlasTexels, rasterize, welded_vertex_normals};
 
 use crate::error::GeometryError;

@@ -34,6 +34,10 @@ pub(super) fn place(charts: &[FlatChart], density: f64, options: &UnwrapOptions)
         if side <= options.max_atlas_px {
             return Ok(placed);
         }
+        // Charts below a texel are all gutter: nothing gets smaller.
+        if side >= smallest && density * longest < 1.0 {
+            break;
+        }
         smallest = smallest.min(side);
         density *= (limit / side as f64).clamp(0.5, 0.97);
     }
@@ -50,7 +54,7 @@ fn place_at(
     area: f64,
     options: &UnwrapOptions,
 ) -> (Placed, usize) {
-    let cell = cell_size(area.sqrt() * density, charts.len(), options.gutter_px);
+    let cell = cell_size(area.sqrt() * density, charts.len());
     let pad = options.gutter_px.div_ceil(2) as f64;
     let shape = |(chart, upright): (&FlatChart, &Upright)| upright.shape(chart, density, pad, cell);
     let shapes: Vec<Shape> = charts.par_iter().zip(upright).map(shape).collect();
@@ -59,7 +63,7 @@ fn place_at(
     let texels = upright.iter().zip(&shapes).zip(&packed.places);
     let texels = texels.map(|((upright, shape), place)| {
         let corner = Vector2::new(place.x as f64, place.y as f64);
-        let turn = |p: &Point2<f64>| (shape.turned(upright.texel(p, density, pad) / cell as f64, place.turns) + corner);
+        let turn = |p: &Point2<f64>| shape.turned(upright.texel(p, density, pad) / cell as f64, place.turns) + corner;
         upright.points.iter().map(|p| turn(p) * cell as f64).map(Point2::from).collect()
     });
     let fill_ratio = area * density * density / (size[0] * size[1]) as f64;
@@ -69,17 +73,16 @@ fn place_at(
 /// Texels per packing cell: small for small charts, which waste half a cell all around, and large for
 /// large atlases, whose search costs the cube of the cells per side. A power of two, so that mip levels
 /// of charts align.
-fn cell_size(side: f64, charts: usize, gutter_px: usize) -> usize {
+fn cell_size(side: f64, charts: usize) -> usize {
     let chart_side = side / (charts as f64).sqrt();
-    let finest = if side > 2048.0 {
-        4
-    } else if side > 700.0 {
-        2
-    } else {
-        1
+    let finest = match side as usize {
+        0..400 => 1,
+        400..1300 => 2,
+        1300..3000 => 4,
+        _ => 8,
     };
-    let wanted = (chart_side / 40.0).max(1.0) as usize;
-    wanted.next_power_of_two().min(8).max(finest).min(gutter_px.next_power_of_two().max(4))
+    // Crowds of small charts take finer cells; their search is cheap, for they fill the first rows.
+    finest.min(((chart_side / 12.0).max(1.0) as usize).next_power_of_two())
 }
 
 /// A chart turned into its smallest rectangle, whose lower left corner is the origin; y up.

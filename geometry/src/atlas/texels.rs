@@ -156,6 +156,14 @@ impl TexelTriangle {
         best
     }
 
+    /// Whether `p` lies inside, a thousandth of a texel from the edges at least.
+    fn holds(&self, p: Point2<f64>) -> bool {
+        (0..3).all(|k| {
+            let (from, to) = (self.corners[k], self.corners[(k + 1) % 3]);
+            (to - from).perp(&(p - from)) * self.area.signum() > 1e-3 * (to - from).norm()
+        })
+    }
+
     /// Whether the triangle meets the open square of half-width 1 around `p`; its box is known to.
     fn meets_square(&self, p: Point2<f64>) -> bool {
         (0..3).all(|k| {
@@ -220,4 +228,29 @@ impl Canvas {
             }
         }
     }
+}
+
+/// Texel centres that lie well inside two faces: an atlas must have none.
+pub(crate) fn overlapping_texels(mesh: &TexturedMesh) -> usize {
+    let [width, height] = mesh.atlas_size;
+    let triangles = triangles_in_texels(mesh);
+    let bands = triangles_of_bands(&triangles, height);
+    let in_band = |(band, faces): (usize, Vec<u32>)| {
+        let (top, end) = (band * BAND, ((band + 1) * BAND).min(height));
+        let mut covered = vec![0_u8; width * BAND];
+        for triangle in faces.iter().map(|&f| &triangles[f as usize]) {
+            let rows = triangle.span(1, end);
+            for y in rows.start.max(top)..rows.end {
+                for x in triangle.span(0, width) {
+                    // Off the centre, where exporters like to put edges.
+                    if triangle.holds(Point2::new(x as f64 + 0.5013, y as f64 + 0.4987)) {
+                        let count = &mut covered[(y - top) * width + x];
+                        *count = count.saturating_add(1);
+                    }
+                }
+            }
+        }
+        covered.iter().filter(|&&c| c > 1).count()
+    };
+    bands.into_par_iter().enumerate().map(in_band).sum()
 }

@@ -2,12 +2,11 @@
 
 mod check;
 pub mod half_edge;
-mod islands;
+pub mod io;
 mod separate;
 mod smooth;
 
 pub use check::MeshCheck;
-pub use islands::without_islands;
 pub use separate::separate_sheets;
 pub use smooth::{TaubinOptions, taubin_smooth};
 

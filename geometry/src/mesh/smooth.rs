@@ -20,9 +20,10 @@ pub struct TaubinOptions {
 }
 
 impl Default for TaubinOptions {
-    /// Ten iterations with the pass band 0.1 of Taubin's paper.
+    /// Ten iterations; pass band 0.089. Taubin's (0.6307, -0.6732) smooths faster and swells what lies
+    /// inside the band by 5 % in 50 iterations, these by 1 %.
     fn default() -> Self {
-        Self { iterations: 10, lambda: 0.6307, mu: -0.6732 }
+        Self { iterations: 10, lambda: 0.33, mu: -0.34 }
     }
 }
 

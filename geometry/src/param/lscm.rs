@@ -75,3 +75,74 @@ fn pins(patch: &Patch) -> Option<[u32; 2]> {
     let second = farthest_from(position(first).coords)?;
     (position(first) != position(second)).then_some([first, second])
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::Mesh;
+    use crate::mesh::half_edge::HalfEdges;
+    use crate::param::check;
+    use crate::param::rescale;
+    use nalgebra::Point3;
+
+    /// A disc of rings around a centre, put in space by `place(radius in (0, 1], angle)`.
+    fn disc(rings: usize, place: impl Fn(f64, f64) -> Point3<f64>) -> Patch {
+        let sectors = 6 * rings;
+        let mut mesh = Mesh { positions: vec![place(0.0, 0.0)], faces: Vec::new() };
+        let at = |ring: usize, j: usize| (1 + (ring - 1) * sectors + j % sectors) as u32;
+        for ring in 1..=rings {
+            for j in 0..sectors {
+                let angle = std::f64::consts::TAU * j as f64 / sectors as f64;
+                mesh.positions.push(place(ring as f64 / rings as f64, angle));
+                match ring {
+                    1 => mesh.faces.push([0, at(1, j), at(1, j + 1)]),
+                    _ => mesh.faces.extend([
+                        [at(ring - 1, j), at(ring, j), at(ring, j + 1)],
+                        [at(ring - 1, j), at(ring, j + 1), at(ring - 1, j + 1)],
+                    ]),
+                }
+            }
+        }
+        let half_edges = HalfEdges::new(&mesh.faces, mesh.positions.len());
+        let all: Vec<u32> = (0..mesh.faces.len() as u32).collect();
+        Patch::new(&mesh, &half_edges, &all)
+    }
+
+    fn quality(patch: &Patch) -> check::FlatQuality {
+        let mut flat = flatten(patch).unwrap();
+        rescale(patch, &mut flat);
+        check::judge(patch, &flat)
+    }
+
+    /// METHODS.md E.3 (i): a plane stays itself up to similarity.
+    #[test]
+    fn a_plane_is_reproduced() {
+        let q = quality(&disc(12, |r, a| Point3::new(r * a.cos(), 2.0 * r * a.sin(), 0.3 * r * a.cos())));
+        assert_eq!((q.flips, q.overlaps), (0, false));
+        assert!((q.stretch_l2 - 1.0).abs() < 1e-12 && q.shear < 1.0 + 1e-7, "{q:?}");
+    }
+
+    /// METHODS.md E.3 (ii): a cone of half-angle 45° develops exactly where its faces do; the mesh of
+    /// 72 sectors stands for it within 1 %.
+    #[test]
+    fn a_cone_patch_develops() {
+        let cone = |r: f64, a: f64| {
+            let (x, y) = (0.5 + 0.45 * r * a.cos(), 0.9 * r * a.sin());
+            Point3::new(x * y.cos(), x * y.sin(), x)
+        };
+        let q = quality(&disc(20, cone));
+        assert!((q.stretch_l2 - 1.0).abs() < 1e-3 && q.shear < 1.01, "{q:?}");
+    }
+
+    /// METHODS.md E.3 (iii): a hemisphere is mapped conformally, about stereographically: areas 1 to 4.
+    #[test]
+    fn a_hemisphere_is_conformal() {
+        let half = |r: f64, a: f64| {
+            let t = r * std::f64::consts::FRAC_PI_2;
+            Point3::new(t.sin() * a.cos(), t.sin() * a.sin(), t.cos())
+        };
+        let q = quality(&disc(24, half));
+        assert_eq!((q.flips, q.overlaps), (0, false));
+        assert!(q.shear < 1.05 && (2.5..4.5).contains(&q.area_ratio), "{q:?}");
+    }
+}

@@ -36,7 +36,7 @@ impl Hermitian {
                 std::cmp::Ordering::Greater => columns[r as usize].push((c, value.conj())),
             }
         }
-        columns.iter_mut().for_each(|column| sum_duplicates(column));
+        columns.iter_mut().for_each(sum_duplicates);
         Self { columns, diagonal }
     }
 }

@@ -17,6 +17,14 @@ use std::collections::BinaryHeap;
 /// costs as much as a bend of 0.05: roundness decides on flat ground and never against a crease.
 const ROUNDNESS: f64 = 0.05;
 
+/// Largest `P²/4πA` of a merged chart (a disc has 1, a square 1.3, a strip of 1 : 6 has 2.6), unless one
+/// part was as ragged before: crescents pack badly.
+const MAX_RAGGEDNESS: f64 = 2.6;
+
+/// Share of the mesh's area below which a chart may be as ragged as it likes: a thin strip is better
+/// unfolded in some pieces than in none.
+const RAGGED_SHARE: f64 = 0.02;
+
 /// Largest angle between the mean normals of two charts that merge, as a cosine (75°). Keeps a small
 /// steep side from vanishing in a large flat chart, which the bend alone would allow.
 const MIN_NORMAL_DOT: f64 = 0.26;
@@ -32,6 +40,12 @@ struct Cluster {
     borders: Vec<u32>,
     /// Counts merges, so that older queue entries are recognised.
     version: u32,
+}
+
+impl Cluster {
+    fn raggedness(&self) -> f64 {
+        self.perimeter * self.perimeter / (4.0 * std::f64::consts::PI * self.area)
+    }
 }
 
 /// All edges between two clusters.
@@ -50,6 +64,7 @@ struct Growth<'a> {
     owner: Sets,
     max_bend: f64,
     cost_unit: f64,
+    ragged_area: f64,
 }
 
 /// A chart label per face.
@@ -98,6 +113,7 @@ impl<'a> Growth<'a> {
             borders,
             queue: BinaryHeap::new(),
             max_bend,
+            ragged_area: RAGGED_SHARE * total,
             cost_unit: (1_u64 << 46) as f64 / total.max(f64::MIN_POSITIVE),
         }
     }
@@ -123,8 +139,10 @@ impl<'a> Growth<'a> {
         let bend = area - (a.area_normal + b.area_normal).norm();
         let facing = a.area_normal.dot(&b.area_normal) >= MIN_NORMAL_DOT * a.area_normal.norm() * b.area_normal.norm();
         let perimeter = a.perimeter + b.perimeter - 2.0 * length;
-        let cost = bend.max(0.0) + ROUNDNESS * perimeter * perimeter / (4.0 * std::f64::consts::PI);
-        (facing && bend <= self.max_bend * area && cost.is_finite()).then_some(cost)
+        let disc = perimeter * perimeter / (4.0 * std::f64::consts::PI);
+        let cost = bend.max(0.0) + ROUNDNESS * disc;
+        let ragged = area > self.ragged_area && disc > MAX_RAGGEDNESS.max(a.raggedness()).max(b.raggedness()) * area;
+        (facing && !ragged && bend <= self.max_bend * area && cost.is_finite()).then_some(cost)
     }
 
     /// Whether both sides together are a disc: χ(A ∪ B) = χ(A) + χ(B) − χ(A ∩ B) = 1.

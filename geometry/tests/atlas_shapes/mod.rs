@@ -1,23 +1,24 @@
 //! Meshes that atlas tests and benchmarks unfold.
 
 #![allow(dead_code, reason = "every test binary uses some of it")]
+#![allow(clippy::unwrap_used, reason = "a helper that fails fails its test")]
 
 use geometry::{Mesh, SimplifyOptions, simplify};
 use nalgebra::{Point3, Vector3};
 use std::collections::HashMap;
 
 /// The texel size at which the mesh's area fills about 70 % of an atlas of `side` texels.
-pub fn texel_size(mesh: &Mesh, side: usize) -> f64 {
+pub(crate) fn texel_size(mesh: &Mesh, side: usize) -> f64 {
     (area(mesh) / 0.7).sqrt() / side as f64
 }
 
-pub fn area(mesh: &Mesh) -> f64 {
+pub(crate) fn area(mesh: &Mesh) -> f64 {
     (0..mesh.faces.len()).map(|f| mesh.face_area_vector(f).norm() / 2.0).sum()
 }
 
 /// A ball on a ring, with grooves, cut by planes as a hull is, and noise of a third of a grid cell;
 /// simplified to `faces` triangles.
-pub fn hull_like(faces: usize) -> Mesh {
+pub(crate) fn hull_like(faces: usize) -> Mesh {
     let n = 72;
     let fine = marching_tetrahedra(n, 1.6, |p| hull_field(p) + 0.3 * 3.2 / n as f64 * noise(p * 30.0));
     simplify(&fine, &SimplifyOptions { target_faces: faces, max_error: None }).unwrap().mesh
@@ -52,7 +53,7 @@ fn noise(p: Vector3<f64>) -> f64 {
 
 /// The zero surface of a field over `[-half, half]³` in n³ cells, each cut into six tetrahedra around
 /// its diagonal: always a closed manifold if the field is positive on the border.
-pub fn marching_tetrahedra(n: usize, half: f64, field: impl Fn(Vector3<f64>) -> f64) -> Mesh {
+pub(crate) fn marching_tetrahedra(n: usize, half: f64, field: impl Fn(Vector3<f64>) -> f64) -> Mesh {
     let at = |i: usize| {
         let (x, y, z) = (i % (n + 1), i / (n + 1) % (n + 1), i / (n + 1) / (n + 1));
         Vector3::new(x as f64, y as f64, z as f64) * (2.0 * half / n as f64) - Vector3::repeat(half)
@@ -96,7 +97,7 @@ pub fn marching_tetrahedra(n: usize, half: f64, field: impl Fn(Vector3<f64>) -> 
 }
 
 /// A sphere of latitudes and longitudes.
-pub fn sphere(rings: usize) -> Mesh {
+pub(crate) fn sphere(rings: usize) -> Mesh {
     let sectors = 2 * rings;
     let mut positions = vec![Point3::new(0.0, 0.0, 1.0)];
     for i in 1..rings {
@@ -122,7 +123,7 @@ pub fn sphere(rings: usize) -> Mesh {
 }
 
 /// A torus of radii 1 and 0.4.
-pub fn torus(n: usize, m: usize) -> Mesh {
+pub(crate) fn torus(n: usize, m: usize) -> Mesh {
     let point = |i: usize, j: usize| {
         let (u, v) = (std::f64::consts::TAU * i as f64 / n as f64, std::f64::consts::TAU * j as f64 / m as f64);
         let r = 1.0 + 0.4 * v.cos();
@@ -132,7 +133,7 @@ pub fn torus(n: usize, m: usize) -> Mesh {
 }
 
 /// A grid of n × m quads over `point`; closed in both directions if `wrapped`.
-pub fn grid(n: usize, m: usize, wrapped: bool, point: impl Fn(usize, usize) -> Point3<f64>) -> Mesh {
+pub(crate) fn grid(n: usize, m: usize, wrapped: bool, point: impl Fn(usize, usize) -> Point3<f64>) -> Mesh {
     let (columns, rows) = if wrapped { (n, m) } else { (n + 1, m + 1) };
     let positions = (0..columns * rows).map(|i| point(i % columns, i / columns)).collect();
     let at = |i: usize, j: usize| (i % columns + (j % rows) * columns) as u32;
@@ -145,7 +146,7 @@ pub fn grid(n: usize, m: usize, wrapped: bool, point: impl Fn(usize, usize) -> P
 }
 
 /// The unit cube, every side in n × n quads.
-pub fn cube(n: usize) -> Mesh {
+pub(crate) fn cube(n: usize) -> Mesh {
     let field = |corner: Vector3<f64>, u: Vector3<f64>, v: Vector3<f64>| {
         grid(n, n, false, move |i, j| Point3::from(corner + u * (i as f64 / n as f64) + v * (j as f64 / n as f64)))
     };
