@@ -6,9 +6,13 @@ use capture::{Aabb, View};
 use geometry::hull::{HullOptions, choose_hull, visual_hull};
 use geometry::mesh::io::read_mesh;
 use geometry::{Mesh, SimplifyOptions, TexturedMesh, UnwrapOptions, unwrap_mesh};
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
 use std::path::{Path, PathBuf};
 use texture::{Bake, FitOptions, FitReport, Method, Model};
+
+/// Room around a given box, in its longest side. The box of the object is not that of its hull, which
+/// reaches beyond: cut at its own box, the Middlebury temple loses 1.6 % of silhouette IoU.
+const BOX_MARGIN: f64 = 0.1;
 
 /// Least and largest side of the atlas of a mesh that brings its own.
 const MIN_ATLAS_PX: usize = 64;
@@ -74,7 +78,8 @@ pub fn hull(
     stages: &mut Stages<'_>,
 ) -> Result<Mesh, Error> {
     refuse_one_place(views)?;
-    let base = HullOptions { resolution: options.resolution, aabb, ..HullOptions::default() };
+    let (aabb, resolution) = roomier(aabb, options.resolution);
+    let base = HullOptions { resolution, aabb, ..HullOptions::default() };
     let chosen = match (options.consensus, options.grow_px) {
         (Some(consensus), Some(grow_px)) => HullOptions { consensus, grow_px, ..base },
         (consensus, grow_px) => {
@@ -85,6 +90,15 @@ pub fn hull(
         }
     };
     Ok(stages.run("hull", |_| visual_hull(views, &chosen))?.mesh)
+}
+
+/// The box with room around it, and the resolution at which its cells stay as large as asked for.
+fn roomier(aabb: Option<Aabb>, resolution: Option<usize>) -> (Option<Aabb>, Option<usize>) {
+    let Some(tight) = aabb else { return (None, resolution) };
+    let margin = Vector3::repeat(BOX_MARGIN * tight.size().max());
+    let scale = 1.0 + 2.0 * BOX_MARGIN;
+    let resolution = resolution.map(|n| (n as f64 * scale).round() as usize);
+    (Some(Aabb { min: tight.min - margin, max: tight.max + margin }), resolution)
 }
 
 /// Silhouettes from one place leave the depth open, which a box of the object would only hide.
