@@ -144,7 +144,7 @@ fn broken_cameras_are_named() {
 #[test]
 fn views_that_make_no_shape_are_refused() {
     let place = place();
-    assert_fails(place.path(), &["model", "capture", "-o", "m.glb", "--views", "0"], &[]);
+    assert_fails(place.path(), &["model", "capture", "-o", "m.glb", "--views", "0"], &["one place", "views"]);
     // A silhouette in the wrong corner of every view: nothing is common to them.
     for i in 0..VIEWS {
         let mut matte = capture::Image::filled(96, 72, 0);
@@ -164,6 +164,46 @@ fn two_identical_views_are_as_good_as_one() {
     });
     let run = turnlight(place.path(), &["model", "capture", "-o", "m.glb", "--json"]);
     assert_eq!(json(&run)["views"], VIEWS + 1);
+    assert_fails(place.path(), &["model", "capture", "-o", "n.glb", "--views", "0,1"], &["one place"]);
+}
+
+#[test]
+fn a_mesh_may_be_brought_with_holes_or_refused_by_name() {
+    let place = place();
+    let run = turnlight(place.path(), &["hull", "capture", "-o", "hull.obj", "--resolution", "32", "--quiet"]);
+    assert_eq!(run.code, Some(0), "{}", run.stderr);
+    // Every fifth face missing.
+    let text = fs::read_to_string(place.path().join("hull.obj")).expect("a mesh");
+    let holed = text.lines().enumerate().filter(|(i, line)| !line.starts_with('f') || i % 5 > 0).map(|(_, line)| line);
+    fs::write(place.path().join("holed.obj"), holed.collect::<Vec<_>>().join("\n")).expect("written");
+    let facts = json(&turnlight(place.path(), &["info", "holed.obj", "--json"]));
+    assert_eq!(facts["closed_manifold"], false);
+    let run = turnlight(place.path(), &["model", "capture", "-o", "m.glb", "--mesh", "holed.obj", "--json"]);
+    assert_eq!(json(&run)["triangles"], facts["triangles"]);
+
+    fs::write(place.path().join("nan.obj"), "v 0 0 0\nv nan 0 0\nv 0 1 0\nf 1 2 3\n").expect("written");
+    fs::write(place.path().join("empty.ply"), "").expect("written");
+    let bytes = fs::read(place.path().join("m.glb")).expect("a model");
+    fs::write(place.path().join("cut.glb"), &bytes[..bytes.len() / 2]).expect("written");
+    for mesh in ["nan.obj", "empty.ply", "cut.glb", "none.ply"] {
+        assert_fails(place.path(), &["model", "capture", "-o", "n.glb", "--mesh", mesh], &[mesh]);
+    }
+    assert_fails(place.path(), &["render", "cut.glb", "--turntable", "2", "-o", "r"], &["cut.glb"]);
+    assert_fails(place.path(), &["info", "cut.glb"], &["cut.glb"]);
+}
+
+#[test]
+fn an_object_that_leaves_the_frame_is_still_modelled() {
+    let place = place();
+    // The right half of view 2 is unknown from now on: silhouette to the very border.
+    let path = frame_file(place.path(), "mask_path", 2);
+    let mut matte = capture::read_matte(&path).expect("a mask");
+    (0..72).for_each(|y| (48..96).for_each(|x| matte.set(x, y, 255)));
+    capture::write_matte(&path, &matte).expect("written");
+    let run = turnlight(place.path(), &["hull", "capture", "-o", "h.ply", "--json"]);
+    let facts = json(&run);
+    assert_eq!(facts["closed_manifold"], true);
+    assert!(facts["silhouette_iou"][0].as_f64().expect("IoU") > 0.9);
 }
 
 #[test]

@@ -264,7 +264,7 @@ pub(crate) struct SynthArgs {
 pub(crate) struct Auto<T>(pub(crate) Option<T>);
 
 fn resolution(text: &str) -> Result<Auto<usize>, String> {
-    auto(text, |text| bounded(text, 4096))
+    auto(text, |text| bounded(text, 3000))
 }
 
 fn consensus(text: &str) -> Result<Auto<usize>, String> {

@@ -8,17 +8,20 @@ use std::process::Command;
 
 /// The validator's release our files are checked with.
 const VALIDATOR: &str = "gltf-validator@2.0.0-dev.3.10";
-/// What the referee imports.
+/// The independent scorer of the image figures.
+const REFEREE: &str = "../shared/referee.py";
+/// What it imports.
 const MODULES: &str = "import numpy, PIL, skimage";
 
 /// Installs the tools and says where they are, as environment variables of the tests. A tool that
 /// cannot be had is named, and its tests skip.
 pub(crate) fn prepare(root: &Path) -> Vec<(&'static str, PathBuf)> {
     let tools = std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| root.join("target"), PathBuf::from).join("tools");
-    let found = [
-        ("TURNLIGHT_GLTF_VALIDATOR", "the glTF validator", validator(&tools)),
-        ("TURNLIGHT_PYTHON", "Python with numpy, Pillow and scikit-image", python(&tools)),
-    ];
+    let mut found = vec![("TURNLIGHT_GLTF_VALIDATOR", "the glTF validator", validator(&tools))];
+    // The referee is no part of the project: Python is wanted only where it lies beside it.
+    if root.join(REFEREE).exists() {
+        found.push(("TURNLIGHT_PYTHON", "Python with numpy, Pillow and scikit-image", python(&tools)));
+    }
     let mut variables = Vec::new();
     for (variable, what, place) in found {
         match place {

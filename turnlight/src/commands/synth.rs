@@ -3,8 +3,9 @@
 use crate::Answer;
 use crate::arguments::SynthArgs;
 use serde_json::json;
+use std::path::Path;
 use turnlight::Error;
-use turnlight::data_synth::{Scene, SynthCapture, SynthOptions, synthesize_with};
+use turnlight::data_synth::{Layout, Scene, SynthCapture, SynthError, SynthOptions, synthesize_with};
 use turnlight::render::film::write_film;
 use turnlight::stages::{Observer, Stages};
 
@@ -14,7 +15,15 @@ const FPS: f64 = 12.0;
 pub(crate) fn run(args: &SynthArgs, observer: &dyn Observer) -> Result<Answer, Error> {
     let scene: Scene = args.scene.parse().map_err(|fault| Error::Arguments(format!("{fault}")))?;
     let [width, height] = args.size;
-    let options = SynthOptions { views: args.views, width, height, seed: args.seed, ..SynthOptions::default() };
+    refuse_occupied(&args.output)?;
+    let options = SynthOptions {
+        views: args.views,
+        width,
+        height,
+        seed: args.seed,
+        layout: layout(args.views),
+        ..SynthOptions::default()
+    };
     let mut stages = Stages::new(observer);
     let filmed = film(scene, &options, &mut stages)?;
     stages.run("write", |_| filmed.write(&args.output))?;
@@ -39,6 +48,23 @@ pub(crate) fn run(args: &SynthArgs, observer: &dyn Observer) -> Result<Answer, E
         "stages": stages.finished(),
     });
     Ok(Answer { text, json })
+}
+
+/// The usual rings, or as many of them as there are views for.
+fn layout(views: usize) -> Layout {
+    match SynthOptions::default().layout {
+        Layout::Rings { mut elevations_deg } => {
+            elevations_deg.truncate(views);
+            Layout::Rings { elevations_deg }
+        }
+        other => other,
+    }
+}
+
+/// Before a minute is spent on filming.
+fn refuse_occupied(output: &Path) -> Result<(), Error> {
+    let is_free = !output.exists() || std::fs::read_dir(output).is_ok_and(|mut entries| entries.next().is_none());
+    if is_free { Ok(()) } else { Err(SynthError::Exists { path: output.to_path_buf() }.into()) }
 }
 
 /// Films a scene as a stage.
