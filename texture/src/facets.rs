@@ -1,7 +1,8 @@
 //! Facets: the parts of the surface that have their own views, rank, basis and coefficients.
 //!
 //! A facet is a compact part of a chart. Smaller facets need fewer layers for the same error (less
-//! happens on each) and hold more coefficients; about four thousand texels (64²) balance the two.
+//! happens on each) and hold more coefficients; about a thousand texels (32²) balance the two: on
+//! the 156 training views of the full temple, going from 64² to 32² took the error from 3.13 to 3.05 % for 0.8 MB.
 
 use crate::surface::SurfaceTexels;
 use geometry::TexturedMesh;

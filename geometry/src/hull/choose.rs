@@ -36,7 +36,7 @@ pub struct HullChoice {
 }
 
 /// Cells along the longest side of the coarse hulls.
-const RESOLUTION: usize = 128;
+const RESOLUTION: usize = 192;
 /// Views scored, evenly spread over the given ones.
 const SCORED_VIEWS: usize = 32;
 /// Growths tried, in pixels: a threshold on a blurred edge is off by up to a pixel.
