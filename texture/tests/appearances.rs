@@ -28,10 +28,11 @@ fn error_from(
     let atlas = model.atlas(eye);
     let (mut sum, mut count) = (0.0, 0.0);
     for (at, point, _) in texels(&model.mesh) {
-        // The cube's own normal: that of the texels is smooth across its edges.
+        // The cube's own normal, for that of the texels is smooth across its edges; and away from these, where
+        // eroded silhouettes let other views step in.
         let axis = point.coords.iamax();
         let normal = Vector3::from_fn(|i, _| if i == axis { point[axis].signum() } else { 0.0 });
-        let rim = point.coords.iter().filter(|v| v.abs() > 0.9).count() > 1;
+        let rim = point.coords.iter().filter(|v| v.abs() > 0.8).count() > 1;
         let to_eye = (eye - point).normalize();
         if rim || normal.dot(&to_eye) < 0.4 {
             continue;
