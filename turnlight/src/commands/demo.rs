@@ -7,7 +7,7 @@ use crate::arguments::DemoArgs;
 use serde_json::json;
 use std::path::Path;
 use turnlight::capture::{Camera, Capture, LoadOptions};
-use turnlight::data_synth::{Scene, SynthOptions};
+use turnlight::data_synth::{Layout, Scene, SynthOptions};
 use turnlight::evaluate::{self, CompareOptions};
 use turnlight::output::{OutputFolder, write_file};
 use turnlight::pipeline::ShapeOptions;
@@ -17,17 +17,20 @@ use turnlight::stages::{Observer, Stages};
 use turnlight::texture::{FitOptions, Method, Model};
 use turnlight::{Error, pipeline, playback};
 
-/// What is filmed.
-const SCENE: Scene = Scene::Temple;
-/// Frames of the turntable film, and how fast they go by: a turn in three seconds.
-const FRAMES: usize = 36;
+/// What is filmed: glossy, so that a static texture cannot do.
+const SCENE: Scene = Scene::Elephant;
+/// One ring above the table, as a turntable gives.
+const ELEVATION_DEG: f64 = 20.0;
+/// Frames of the turntable film, and how fast they go by: a turn in four seconds.
+const FRAMES: usize = 48;
 const FPS: f64 = 12.0;
-const FILM_SIZE: [usize; 2] = [320, 240];
+const FILM_SIZE: [usize; 2] = [400, 300];
 
 pub(crate) fn run(args: &DemoArgs, observer: &dyn Observer) -> Result<Answer, Error> {
     let folder = OutputFolder::create(&args.output)?;
     let mut stages = Stages::new(observer);
-    let options = SynthOptions { seed: args.seed, ..SynthOptions::default() };
+    let layout = Layout::Rings { elevations_deg: vec![ELEVATION_DEG] };
+    let options = SynthOptions { seed: args.seed, layout, ..SynthOptions::default() };
     film(SCENE, &options, &mut stages)?.write(folder.path().join("capture"))?;
     let capture = Capture::read(&folder.path().join("capture"))?;
     let model = make_model(&capture, &folder, &mut stages)?;
