@@ -10,7 +10,7 @@ mod hull_support;
 
 use capture::{Aabb, View};
 use geometry::{HullOptions, Mesh, visual_hull};
-use hull_support::{middlebury, shared, torus};
+use hull_support::{all_views, shared, torus};
 use nalgebra::Point3;
 use std::fmt::Write;
 use std::sync::LazyLock;
@@ -19,7 +19,7 @@ use std::time::Instant;
 static TORUS: LazyLock<Vec<View>> =
     LazyLock::new(|| shared("analytic_torus").map_or_else(Vec::new, |folder| torus(&folder, "masks")));
 static TEMPLE: LazyLock<Vec<View>> =
-    LazyLock::new(|| shared("templeRing").map_or_else(Vec::new, |folder| middlebury(&folder)));
+    LazyLock::new(|| shared("templeRing").map_or_else(Vec::new, |folder| all_views(&folder)));
 
 fn main() {
     let args: Vec<String> = std::env::args().collect();

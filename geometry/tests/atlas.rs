@@ -97,6 +97,21 @@ fn a_hull_unfolds_into_few_charts() {
     assert!(u.report.fill_ratio >= 0.63, "{}", u.report.fill_ratio);
 }
 
+/// Notches of a noisy border, rings around tunnels and shards once made 472 charts of this one.
+#[test]
+fn a_noisy_hull_of_high_genus_unfolds_into_few_charts() {
+    let mesh = noisy_hull(16_000);
+    let check = mesh.check().unwrap();
+    let start = Instant::now();
+    let u = unwrap(&mesh, 1024);
+    eprintln!("{check:?} {:?}, {:?} {:#?}", start.elapsed(), u.mesh.atlas_size, u.report);
+    picture(&u, "noisy_hull");
+    check_atlas(&u, 4.0);
+    assert!(check.components as i64 - check.euler / 2 >= 10, "genus: {check:?}");
+    assert!(u.report.charts <= 130, "{} charts", u.report.charts);
+    assert!(u.report.stretch_l2 < 1.05 && u.report.seam_length < 60.0, "{:?}", u.report);
+}
+
 #[test]
 fn a_cube_has_six_charts() {
     for n in [1, 8] {

@@ -21,7 +21,7 @@ pub use texels::{AtlasTexel, AtlasTexels, rasterize, welded_vertex_normals};
 use crate::error::GeometryError;
 use crate::mesh::half_edge::HalfEdges;
 use crate::mesh::{Mesh, TexturedMesh};
-use crate::param::{FlatChart, FlatteningLimits, flatten_chart};
+use crate::param::{FlatChart, FlatteningLimits, flatten_chart, merge_small};
 use crate::segment::{SegmentOptions, segment};
 use rayon::prelude::*;
 
@@ -145,7 +145,8 @@ fn flatten_all(mesh: &Mesh, half_edges: &HalfEdges, options: &UnwrapOptions) -> 
     let flatten = |part: Vec<u32>| flatten_chart(mesh, half_edges, part, &options.limits);
     let flat: Vec<_> = parts.into_par_iter().map(flatten).collect();
     let splits = flat.iter().map(|f| f.1).sum();
-    let mut charts: Vec<FlatChart> = flat.into_iter().flat_map(|f| f.0).collect();
+    let charts = flat.into_iter().flat_map(|f| f.0).collect();
+    let mut charts = merge_small(mesh, half_edges, charts, &options.limits);
     // Rounded, so that equal charts keep their order in any unit.
     charts.sort_by_cached_key(|c| (std::cmp::Reverse((c.patch.area() * 1e12).round() as u64), c.patch.faces[0]));
     (charts, splits)

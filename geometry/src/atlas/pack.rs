@@ -25,7 +25,7 @@ const GENERATION: usize = 16;
 const GENERATIONS: usize = 32;
 
 /// Word operations, by [`cost_of_trial`], that one search may cost: about a second of one core, as
-/// most of them are saved by looking at gaps first.
+/// most of them are saved by looking at gaps first and by giving up on trials that waste more.
 const BUDGET: f64 = 3e10;
 
 /// Up to this ratio of its sides an atlas counts as square.
@@ -104,14 +104,14 @@ pub(super) fn pack(shapes: &[Shape], unit: usize) -> Packed {
     let trials = (BUDGET / cost_of_trial(shapes)) as usize;
     let first = |i: usize| {
         let plan = Plan { order: order_of(shapes, i % 2 == 1), by_center: i / 2 % 2 == 1 };
-        pack_width(shapes, plan, width_of(shapes, WIDTHS[i / 4 * 2 % WIDTHS.len()], unit), unit)
+        pack_width(shapes, plan, width_of(shapes, WIDTHS[i / 4 * 2 % WIDTHS.len()], unit), unit, f64::INFINITY)
     };
     let mut best = smallest((0..trials.clamp(1, GENERATION)).into_par_iter().map(first).collect(), unit);
     for generation in 1..(trials / GENERATION).min(GENERATIONS) {
         let next = |i: usize| {
             let seed = generation * GENERATION + i;
             let width = width_of(shapes, WIDTHS[hash(seed) % WIDTHS.len()], unit);
-            pack_width(shapes, best.plan.varied(seed), width, unit)
+            pack_width(shapes, best.plan.varied(seed), width, unit, best.waste)
         };
         let mut found: Vec<Packed> = (0..GENERATION).into_par_iter().map(next).collect();
         found.insert(0, best);
@@ -179,7 +179,8 @@ fn waste([width, height]: [usize; 2]) -> f64 {
     long * short * (long / short / SQUARE).max(1.0)
 }
 
-fn pack_width(shapes: &[Shape], plan: Plan, width: usize, unit: usize) -> Packed {
+/// Packs by a plan; gives up, with infinite waste, as soon as it wastes more than `most`.
+fn pack_width(shapes: &[Shape], plan: Plan, width: usize, unit: usize, most: f64) -> Packed {
     let mut bin = Bin { width, words: width.div_ceil(64), rows: Vec::new(), height: 0, gaps: Vec::new() };
     let mut places = vec![Place::default(); shapes.len()];
     // Equal shapes never fit lower than the one before.
@@ -198,6 +199,9 @@ fn pack_width(shapes: &[Shape], plan: Plan, width: usize, unit: usize) -> Packed
         }
         places[i] = best.1;
         bin.put(&shapes[i], places[i]);
+        if waste([width, bin.height]) > most {
+            return Packed { places, size: [width, usize::MAX], waste: f64::INFINITY, plan };
+        }
     }
     // Judged by the rows in use: the rounded height would hide small gains.
     let waste = waste([width, bin.height]);

@@ -67,7 +67,7 @@ pub(super) fn judge(patch: &Patch, flat: &[Point2<f64>]) -> FlatQuality {
         shears.push((large / small, area));
     }
     // Without flips, the map covers every point once iff its outline is simple (degree of a map).
-    let overlaps = flips == 0 && boundary_crosses(&patch.border, flat);
+    let overlaps = flips == 0 && !crossings(&patch.border, flat, 1).is_empty();
     let ratio = quantile(&mut scales, 0.98) / quantile(&mut scales, 0.02);
     let stretch_l2 = (stretch / patch.area().max(f64::MIN_POSITIVE)).sqrt();
     FlatQuality { flips, overlaps, stretch_l2, area_ratio: ratio, shear: quantile(&mut shears, 0.98) }
@@ -97,20 +97,27 @@ fn quantile(values: &mut [(f64, f64)], share: f64) -> f64 {
     found.or(values.last()).map_or(1.0, |v| v.0)
 }
 
-/// Whether two edges of an outline that share no vertex meet. Sweeps along x.
-fn boundary_crosses(border: &[[u32; 2]], flat: &[Point2<f64>]) -> bool {
-    let ends = |e: &[u32; 2]| e.map(|v| flat[v as usize]);
-    let mut edges: Vec<_> = border.iter().map(|e| (*e, ends(e)[0].x.min(ends(e)[1].x))).collect();
+/// Pairs of border edges that share no vertex and meet, by their places in `border`; at most `limit`.
+/// Sweeps along x.
+pub(super) fn crossings(border: &[[u32; 2]], flat: &[Point2<f64>], limit: usize) -> Vec<[usize; 2]> {
+    let ends = |e: usize| border[e].map(|v| flat[v as usize]);
+    let mut edges: Vec<_> = (0..border.len()).map(|e| (e, ends(e)[0].x.min(ends(e)[1].x))).collect();
     edges.sort_by(|a, b| a.1.total_cmp(&b.1));
-    (0..edges.len()).any(|i| {
-        let [a, b] = ends(&edges[i].0);
+    let mut found = Vec::new();
+    for (i, &(first, _)) in edges.iter().enumerate() {
+        let [a, b] = ends(first);
         let end = a.x.max(b.x);
-        let later = edges[i + 1..].iter().take_while(|e| e.1 <= end);
-        later.filter(|e| !e.0.iter().any(|v| edges[i].0.contains(v))).any(|e| {
-            let [c, d] = ends(&e.0);
-            segments_meet(a, b, c, d)
-        })
-    })
+        let later = edges[i + 1..].iter().take_while(|e| e.1 <= end).map(|e| e.0);
+        found.extend(later.filter(|&e| !border[e].iter().any(|v| border[first].contains(v))).filter_map(|e| {
+            let [c, d] = ends(e);
+            segments_meet(a, b, c, d).then_some([first, e])
+        }));
+        if found.len() >= limit {
+            found.truncate(limit);
+            break;
+        }
+    }
+    found
 }
 
 fn segments_meet(a: Point2<f64>, b: Point2<f64>, c: Point2<f64>, d: Point2<f64>) -> bool {

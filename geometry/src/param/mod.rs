@@ -1,11 +1,13 @@
 //! From charts to flat charts: every triangle upright, none on another, areas kept.
 //!
 //! `patch` gives a chart its own vertices, `lscm` flattens it conformally, `relax` evens out its areas,
-//! `untangle` turns single flipped triangles back, `check` judges the result; a chart that fails is
-//! split in two and both halves start over. A single triangle is always valid, so this ends.
+//! `untangle` turns single flipped triangles back and parts an outline that crosses itself, `check`
+//! judges the result; a chart that fails is split in two and both halves start over. A single triangle
+//! is always valid, so this ends. `merge` then joins what is small to a neighbour, under the same judge.
 
 mod check;
 mod lscm;
+mod merge;
 mod patch;
 mod relax;
 mod solve;
@@ -14,6 +16,7 @@ mod untangle;
 pub(crate) use check::FlatQuality;
 pub use check::FlatteningLimits;
 use check::signed_area;
+pub(crate) use merge::merge_small;
 pub(crate) use patch::Patch;
 
 use crate::mesh::Mesh;
@@ -66,6 +69,8 @@ fn flatten_whole(patch: &Patch, limits: &FlatteningLimits) -> Option<(Vec<Point2
     let conformal = lscm::flatten(patch)?;
     let accept = |mut flat: Vec<Point2<f64>>| {
         untangle::untangle(patch, &mut flat);
+        rescale(patch, &mut flat);
+        untangle::part_outline(patch, &mut flat);
         rescale(patch, &mut flat);
         let quality = check::judge(patch, &flat);
         quality.is_valid(limits).then_some((flat, quality))

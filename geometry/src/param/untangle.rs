@@ -1,10 +1,10 @@
-//! Single flipped triangles turned back.
+//! Single flipped triangles turned back, and outlines that cross themselves parted.
 //!
 //! Slivers of a hull flip now and then in an otherwise good map. A vertex may lie anywhere in the kernel
 //! of its ring, the points that see the whole ring from inside; where it is not empty, its centroid
 //! unflips all triangles of the vertex at once.
 
-use super::check::{MIN_AREA_RATIO, signed_area};
+use super::check::{MIN_AREA_RATIO, crossings, signed_area};
 use super::patch::Patch;
 use nalgebra::Point2;
 
@@ -13,6 +13,60 @@ const SWEEPS: usize = 10;
 
 /// More flips than this share of a chart are no accident, and the chart is better split.
 const MAX_SHARE: f64 = 0.1;
+
+/// Rounds in which an outline may part.
+const PARTINGS: usize = 12;
+
+/// More crossings than this share of an outline's edges (and [`FEW_CROSSINGS`]) are no accident.
+const MAX_CROSSED_SHARE: f64 = 0.2;
+
+/// So many crossings are tried in any outline.
+const FEW_CROSSINGS: usize = 8;
+
+/// Share of its own area that a triangle keeps while the outline parts.
+const KEPT_AREA: f64 = 0.3;
+
+/// Draws the outline in where it crosses itself.
+///
+/// Around a border vertex of a noisy hull the chart's angles may exceed 2π: the map is as good as any,
+/// but the two sides of the notch lie on each other. They part when the vertices of crossing edges go
+/// inwards, at the price of a few smaller triangles.
+pub(super) fn part_outline(patch: &Patch, flat: &mut [Point2<f64>]) {
+    let limit = FEW_CROSSINGS.max((MAX_CROSSED_SHARE * patch.border.len() as f64) as usize);
+    let mut crossed = crossings(&patch.border, flat, limit);
+    if crossed.is_empty() || crossed.len() == limit {
+        return;
+    }
+    let fans = triangles_of_vertices(patch);
+    for _ in 0..PARTINGS {
+        let mut vertices: Vec<u32> = crossed.iter().flatten().flat_map(|&e| patch.border[e]).collect();
+        vertices.sort_unstable();
+        vertices.dedup();
+        vertices.into_iter().for_each(|v| draw_in(patch, &fans[v as usize], v, flat));
+        crossed = crossings(&patch.border, flat, limit);
+        if crossed.is_empty() {
+            break;
+        }
+    }
+}
+
+/// Moves `v` towards the mean of its neighbours, as far as its triangles keep [`KEPT_AREA`].
+fn draw_in(patch: &Patch, fan: &[u32], v: u32, flat: &mut [Point2<f64>]) {
+    let opposite = fan.iter().flat_map(|&t| opposite_edge(&patch.corners[t as usize], v));
+    let sum = opposite.fold(nalgebra::Vector2::zeros(), |sum, w| sum + flat[w as usize].coords);
+    let (from, target) = (flat[v as usize], Point2::from(sum / (2 * fan.len()) as f64));
+    for share in [0.3, 0.15] {
+        flat[v as usize] = from + (target - from) * share;
+        let keeps = |&t: &u32| {
+            let t = t as usize;
+            signed_area(flat, &patch.corners[t]) >= KEPT_AREA * patch.shapes[t].area()
+        };
+        if fan.iter().all(keeps) {
+            return;
+        }
+    }
+    flat[v as usize] = from;
+}
 
 /// Moves vertices of flipped and nearly flipped triangles into the kernels of their rings.
 pub(super) fn untangle(patch: &Patch, flat: &mut [Point2<f64>]) {

@@ -24,6 +24,20 @@ pub(crate) fn hull_like(faces: usize) -> Mesh {
     simplify(&fine, &SimplifyOptions { target_faces: faces, max_error: None }).unwrap().mesh
 }
 
+/// What real silhouettes leave: the shape of [`hull_like`] pierced by tunnels, with noise of a whole grid
+/// cell and specks that float around it; simplified to `faces` triangles. Genus 12 in 12 parts.
+pub(crate) fn noisy_hull(faces: usize) -> Mesh {
+    let n = 80;
+    let field = |p: Vector3<f64>| {
+        let tunnels = 1.0 - (9.0 * p.x).sin() * (9.0 * p.y).cos() + 0.2 * (7.0 * p.z).sin();
+        let speck = (p - Vector3::new(-0.9, 0.9, 1.0)).norm() - 0.15;
+        let solid = hull_field(p).max(0.12 * (0.35 - tunnels)).min(speck);
+        solid + 3.2 / n as f64 * (0.7 * noise(p * 24.0) + 0.5 * noise(p * 11.0))
+    };
+    let fine = marching_tetrahedra(n, 1.6, field);
+    simplify(&fine, &SimplifyOptions { target_faces: faces, max_error: None }).unwrap().mesh
+}
+
 /// Negative inside.
 fn hull_field(p: Vector3<f64>) -> f64 {
     let ball = (p - Vector3::new(0.0, 0.0, 0.45)).norm() - 0.6 + 0.03 * (9.0 * p.x).sin() * (9.0 * p.y).sin();

@@ -1,7 +1,7 @@
 //! Scenes with exact silhouettes, and readers of the shared captures, for the hull tests.
 #![allow(dead_code, unreachable_pub, clippy::unwrap_used, reason = "test support; each test binary uses its own part")]
 
-use capture::{Camera, Distortion, Image, Intrinsics, View};
+use capture::{Camera, Capture, Distortion, Image, Intrinsics, LoadOptions, View};
 use nalgebra::{Matrix3, Point2, Point3, Vector3};
 use std::path::{Path, PathBuf};
 
@@ -69,30 +69,9 @@ pub fn shared(name: &str) -> Option<PathBuf> {
     Some(path)
 }
 
-/// Every view of a Middlebury folder, masks in `masks/`.
-pub fn middlebury(folder: &Path) -> Vec<View> {
-    let list = std::fs::read_dir(folder).unwrap().map(|e| e.unwrap().path());
-    let list = list.filter(|p| p.to_string_lossy().ends_with("_par.txt")).min().unwrap();
-    let text = std::fs::read_to_string(list).unwrap();
-    let parse = |(index, line): (usize, &str)| {
-        let mut words = line.split_whitespace();
-        let name = words.next().unwrap();
-        let n: Vec<f64> = words.map(|w| w.parse().unwrap()).collect();
-        let matte = read_matte(&folder.join("masks").join(name));
-        let intrinsics = Intrinsics {
-            fx: n[0],
-            fy: n[4],
-            skew: n[1],
-            cx: n[2] + 0.5,
-            cy: n[5] + 0.5,
-            distortion: Distortion::default(),
-            width: matte.width(),
-            height: matte.height(),
-        };
-        let rotation = Matrix3::from_row_slice(&n[9..18]);
-        from_matte(index, Camera { intrinsics, rotation, translation: Vector3::new(n[18], n[19], n[20]) }, matte)
-    };
-    text.lines().skip(1).enumerate().map(parse).collect()
+/// Every view of a calibrated folder.
+pub fn all_views(folder: &Path) -> Vec<View> {
+    Capture::read(folder).unwrap().load_all_views(&LoadOptions::default()).unwrap()
 }
 
 /// The analytic torus, with masks from `masks` or `masks_aa`.
