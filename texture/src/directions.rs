@@ -18,6 +18,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 use spade::{DelaunayTriangulation, HasPosition, Point2, Triangulation};
+use std::f64::consts::PI;
 
 /// How the cameras of a capture lie about the object.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -85,15 +86,20 @@ pub fn layout(directions: &[Vector3<f64>]) -> Layout {
     let smallest = eigen.eigenvalues.imin();
     let off_plane = (eigen.eigenvalues[smallest].max(0.0) / directions.len() as f64).sqrt();
     let axis: Vector3<f64> = eigen.eigenvectors.column(smallest).into();
-    if off_plane < RING_FLATNESS * median_spacing(directions) { Layout::Ring(axis) } else { Layout::General }
+    if off_plane < RING_FLATNESS * spacing(directions) { Layout::Ring(axis) } else { Layout::General }
 }
 
 /// Groups directions that are almost the same; each group lists positions in `directions`, ascending.
 pub fn merge_directions(directions: &[Vector3<f64>]) -> Vec<Vec<usize>> {
-    let reach = MERGE_SHARE * median_spacing(directions);
+    groups_within(directions, MERGE_SHARE * spacing(directions))
+}
+
+/// Each group holds what lies within `reach` of its first member and of that of no group before.
+fn groups_within(directions: &[Vector3<f64>], reach: f64) -> Vec<Vec<usize>> {
+    let reach = (2.0 * (0.5 * reach.min(PI)).sin()).powi(2);
     let mut groups: Vec<Vec<usize>> = Vec::new();
     for (i, d) in directions.iter().enumerate() {
-        match groups.iter_mut().find(|g| angle(d, &directions[g[0]]) <= reach) {
+        match groups.iter_mut().find(|g| squared_chord(d, &directions[g[0]]) <= reach) {
             Some(group) => group.push(i),
             None => groups.push(vec![i]),
         }
@@ -101,18 +107,38 @@ pub fn merge_directions(directions: &[Vector3<f64>]) -> Vec<Vec<usize>> {
     groups
 }
 
+/// The typical angle between neighbours, near-copies counted as one: the median spacing of what is left
+/// once directions closer than [`MERGE_SHARE`] of it are merged. Found from above, because the median
+/// over all of a turn filmed twice is the noise between its copies.
+fn spacing(directions: &[Vector3<f64>]) -> f64 {
+    let mut spacing = directions.iter().map(|d| angle(d, &directions[0])).fold(0.0, f64::max);
+    while spacing > 0.0 {
+        let groups = groups_within(directions, MERGE_SHARE * spacing);
+        let distinct: Vec<Vector3<f64>> = groups.iter().map(|g| directions[g[0]]).collect();
+        let finer = median_spacing(&distinct);
+        if distinct.len() == directions.len() {
+            return finer;
+        }
+        if finer >= spacing {
+            break;
+        }
+        spacing = finer;
+    }
+    spacing
+}
+
 /// Median over directions of the angle to the nearest other one; 0 for fewer than two.
 fn median_spacing(directions: &[Vector3<f64>]) -> f64 {
-    let mut nearest: Vec<f64> = (0..directions.len())
-        .filter_map(|i| {
-            (0..directions.len())
-                .filter(|&j| j != i)
-                .map(|j| angle(&directions[i], &directions[j]))
-                .min_by(f64::total_cmp)
-        })
-        .collect();
+    let others = |i: usize| directions.iter().enumerate().filter(move |(j, _)| *j != i);
+    let nearest = |i: usize| others(i).map(|(_, d)| squared_chord(d, &directions[i])).min_by(f64::total_cmp);
+    let mut nearest: Vec<f64> = (0..directions.len()).filter_map(nearest).collect();
     nearest.sort_by(f64::total_cmp);
-    nearest.get(nearest.len() / 2).copied().unwrap_or(0.0)
+    nearest.get(nearest.len() / 2).map_or(0.0, |chord| 2.0 * (0.5 * chord.sqrt()).min(1.0).asin())
+}
+
+/// Orders unit vectors as their angle does, for a tenth of its cost.
+fn squared_chord(a: &Vector3<f64>, b: &Vector3<f64>) -> f64 {
+    (a - b).norm_squared()
 }
 
 /// The angle between unit vectors, accurate for small angles too.
@@ -278,10 +304,11 @@ fn ring_edges(sites: &[Vector3<f64>], axis: &Vector3<f64>) -> Vec<[u32; 2]> {
     order.sort_by(|&i, &j| azimuth(&sites[i as usize]).total_cmp(&azimuth(&sites[j as usize])));
     let reach = RING_GAP * median_spacing(sites);
     let count = order.len();
-    let closing = if count > 2 { count } else { 1 };
-    (0..closing)
+    // Of two sites one edge leads forward, whichever of them comes first from where azimuths start.
+    let is_near = |i: &Vector3<f64>, j: &Vector3<f64>| angle(i, j) <= reach && turn(i, j, axis) > 0.0;
+    (0..count)
         .map(|k| [order[k], order[(k + 1) % count]])
-        .filter(|&[i, j]| angle(&sites[i as usize], &sites[j as usize]) <= reach)
+        .filter(|&[i, j]| is_near(&sites[i as usize], &sites[j as usize]))
         .collect()
 }
 
@@ -418,6 +445,44 @@ mod tests {
         let groups = merge_directions(&sites);
         assert_eq!(groups.len(), 12);
         assert_eq!(groups[3], [3, 12, 13]);
+    }
+
+    #[test]
+    fn a_turn_filmed_twice_is_one_ring() {
+        let noisy = |k: usize| Vector3::new((k * 7 % 5) as f64, (k * 3 % 7) as f64, (k * 11 % 3) as f64) * 2e-4;
+        let mut sites = ring(36, 0.3);
+        let again: Vec<_> = sites.iter().enumerate().map(|(k, s)| (s + noisy(k)).normalize()).collect();
+        sites.extend(again);
+        assert!(matches!(layout(&sites), Layout::Ring(_)), "layout");
+        let groups = merge_directions(&sites);
+        assert_eq!(groups.len(), 36);
+        assert_eq!(groups[5], [5, 41]);
+        // A film that rests on its first frame.
+        let mut rest = ring(36, 0.3);
+        rest.extend(vec![rest[0]; 100]);
+        assert_eq!(merge_directions(&rest).len(), 36);
+        assert!(matches!(layout(&rest), Layout::Ring(_)), "resting film");
+    }
+
+    #[test]
+    fn a_dense_film_is_not_thinned() {
+        assert_eq!(merge_directions(&ring(1000, 0.2)).len(), 1000);
+        assert_eq!(merge_directions(&dome()).len(), dome().len());
+        assert_eq!(merge_directions(&[Vector3::x(); 4]).len(), 1);
+        assert!(merge_directions(&[]).is_empty());
+    }
+
+    #[test]
+    fn two_sites_of_a_ring_are_joined_wherever_azimuth_starts() {
+        let at = |degrees: f64| Vector3::new(degrees.to_radians().cos(), degrees.to_radians().sin(), 0.2).normalize();
+        for k in 0..36 {
+            let (a, b) = (f64::from(k) * 10.0, f64::from(k) * 10.0 + 20.0);
+            for sites in [[at(a), at(b)], [at(b), at(a)]] {
+                let complex = DirectionComplex::build(&sites, Layout::Ring(Vector3::z()));
+                let w = dense(&complex, at(0.5 * (a + b)));
+                assert!((w[0] - 0.5).abs() < 1e-9 && (w[1] - 0.5).abs() < 1e-9, "{w:?} from {a}°");
+            }
+        }
     }
 
     #[test]
