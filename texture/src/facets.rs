@@ -33,7 +33,7 @@ pub(crate) fn partition(mesh: &TexturedMesh, surface: &SurfaceTexels, target: us
     }
     let mut of_face = vec![0u32; mesh.mesh.faces.len()];
     let mut count = 0u32;
-    for faces in &faces_of_chart {
+    for faces in faces_of_chart.iter().filter(|faces| !faces.is_empty()) {
         let texels: u64 = faces.iter().map(|&f| u64::from(per_face[f as usize])).sum();
         let parts = ((texels as f64 / target as f64).round() as usize).clamp(1, faces.len().max(1));
         let labels = cluster(mesh, faces, &per_face, parts);
