@@ -6,7 +6,7 @@ use crate::facets::{Facets, partition};
 use crate::layers::spread_labels;
 use crate::model::FitOptions;
 use crate::observe::{Observer, Samples};
-use crate::surface::SurfaceTexels;
+use crate::surface::{SurfaceTexels, is_atlas_size};
 use capture::{Image, View};
 use geometry::TexturedMesh;
 use geometry::atlas::PushPull;
@@ -29,8 +29,9 @@ impl<'a> Bake<'a> {
     /// Prepares `views` and the texels of `mesh`.
     ///
     /// # Errors
-    /// Where there is no view or no texel, or more facets than a model can number.
+    /// Where there is no view or no texel, or more texels, views or facets than a model can number.
     pub fn new(views: &'a [View], mesh: &'a TexturedMesh, options: &FitOptions) -> Result<Self, TextureError> {
+        refuse_too_much(views.len(), mesh.atlas_size)?;
         let surface = SurfaceTexels::bake(mesh);
         if views.is_empty() || surface.is_empty() {
             return Err(TextureError::Degenerate {
@@ -88,6 +89,21 @@ impl<'a> Bake<'a> {
         let at = |&t: &u32| image.pixels()[self.surface.index[t as usize] as usize];
         self.facets.texels[facet].iter().map(at).collect()
     }
+}
+
+/// What a model numbers with 16 bits, 65535 meaning none, and what fits in memory.
+fn refuse_too_much(views: usize, atlas_size: [usize; 2]) -> Result<(), TextureError> {
+    let refuse = |fault, remedy: &str| Err(TextureError::Degenerate { fault, remedy: remedy.to_owned() });
+    if views > usize::from(u16::MAX) {
+        return refuse(format!("{views} views are more than the 65535 a model can number"), "use fewer views");
+    }
+    if !is_atlas_size(atlas_size) {
+        return refuse(
+            format!("an atlas of {atlas_size:?} texels is more than a model can hold"),
+            "use coarser texels",
+        );
+    }
+    Ok(())
 }
 
 fn directions_from(center: &Point3<f64>, observers: &[Observer<'_>]) -> Vec<Vector3<f64>> {

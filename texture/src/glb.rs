@@ -10,7 +10,7 @@ use crate::coding;
 use crate::directions::{DirectionComplex, Layout};
 use crate::layers::{FacetWeights, Layer, Layers};
 use crate::model::{Appearance, FitOptions, Method, Model};
-use crate::surface::SurfaceTexels;
+use crate::surface::{self, SurfaceTexels};
 use capture::Image;
 use geometry::{Mesh, TexturedMesh};
 use gltf::binary::{Glb, Header};
@@ -25,8 +25,8 @@ pub const EXTENSION: &str = "TURNLIGHT_view_dependent_texture";
 /// Version of the extension that is written, and the only one read.
 const VERSION: u32 = 1;
 
-/// No atlas is wider or higher; guards allocations.
-const LARGEST_ATLAS: usize = 32_768;
+/// Bytes of the header of a binary glTF.
+const HEADER_BYTES: u32 = 12;
 
 const FLOAT: u32 = 5126;
 const UNSIGNED_INT: u32 = 5125;
@@ -148,7 +148,7 @@ fn assemble(model: &Model) -> Result<(Vec<u8>, u64), TextureError> {
         Appearance::Layers(layers) => write_layers(&mut w, model, layers),
         Appearance::Lumigraph(rays, surface) => write_lumigraph(&mut w, model, rays, surface),
     }
-    .ok_or_else(|| refused("the model's images cannot be coded"))?;
+    .ok_or_else(|| refused("a part of the model is empty or too large to be coded"))?;
     let extension = serde_json::to_value(extension).map_err(|e| refused(&e.to_string()))?;
     let root = root(&w, primitive, extension, preview);
     let json = serde_json::to_vec(&root).map_err(|e| refused(&e.to_string()))?;
@@ -231,7 +231,7 @@ fn write_layers(w: &mut Writer, model: &Model, layers: &Layers) -> Option<(Exten
     write_facets(w, &mut e, &layers.facets)?;
     let preview = match model.method {
         Method::Vdtm => w.image(&mean_of_layers(layers)?, "preview".to_owned()),
-        _ => e.layers[0].image,
+        _ => e.layers.first()?.image,
     };
     Some((e, preview))
 }
@@ -249,6 +249,10 @@ fn mean_of_layers(layers: &Layers) -> Option<Vec<u8>> {
 }
 
 fn write_facets(w: &mut Writer, e: &mut Extension, facets: &[FacetWeights]) -> Option<()> {
+    let is_sound = |f: &FacetWeights| f.rank <= e.layers.len() && f.table.len() == f.rank * f.complex.sites().len();
+    if !facets.iter().all(is_sound) {
+        return None;
+    }
     let scales = coefficient_scales(facets, e.layers.len());
     let (mut counts, mut centers, mut directions) = (Vec::new(), Vec::new(), Vec::new());
     let (mut triangles, mut edges, mut coefficients) = (Vec::new(), Vec::new(), Vec::new());
@@ -258,7 +262,7 @@ fn write_facets(w: &mut Writer, e: &mut Extension, facets: &[FacetWeights]) -> O
             counts.extend(u16::try_from(n).ok()?.to_le_bytes());
         }
         centers.extend([f.center.x, f.center.y, f.center.z].into_iter().flat_map(|v| (v as f32).to_le_bytes()));
-        directions.extend(f.complex.sites().iter().flat_map(|s| [s.x, s.y, s.z]).flat_map(|v| snorm(v).to_le_bytes()));
+        directions.extend(f.complex.sites().iter().flat_map(snorm_direction).flat_map(i16::to_le_bytes));
         triangles.extend(f.complex.triangles().iter().flatten().flat_map(|&i| (i as u16).to_le_bytes()));
         edges.extend(f.complex.edges().iter().flatten().flat_map(|&i| (i as u16).to_le_bytes()));
         let scaled = f.table.iter().enumerate().map(|(i, y)| f64::from(*y) / f64::from(scales[i % f.rank]));
@@ -286,6 +290,31 @@ fn coefficient_scales(facets: &[FacetWeights], layers: usize) -> Vec<f32> {
 /// A number in −1..=1 as glTF's normalised 16-bit integer.
 fn snorm(v: f64) -> i16 {
     (v.clamp(-1.0, 1.0) * 32767.0).round() as i16
+}
+
+/// A unit vector as [`snorm`], such that reading, normalising and writing it again gives the same: what
+/// rounding does to the length can carry a component over half a step. Every round strictly shrinks
+/// the error of the length, so a few do.
+fn snorm_direction(direction: &Vector3<f64>) -> [i16; 3] {
+    let mut stored = direction.map(snorm);
+    for _ in 0..8 {
+        let again = read_direction(stored.map(from_snorm).into()).map(snorm);
+        if again == stored {
+            break;
+        }
+        stored = again;
+    }
+    stored.into()
+}
+
+/// What [`snorm`] stored.
+fn from_snorm(v: i16) -> f64 {
+    (f64::from(v) / 32767.0).max(-1.0)
+}
+
+/// A stored direction at unit length; zero, which no complex accepts, where it is far from it.
+fn read_direction(stored: [f64; 3]) -> Vector3<f64> {
+    Vector3::from(stored).try_normalize(0.5).unwrap_or_default()
 }
 
 fn write_lumigraph(
@@ -321,6 +350,9 @@ impl<'a> Reader<'a> {
         let (start, length) = number("byteOffset")
             .zip(number("byteLength"))
             .ok_or_else(|| format!("buffer view {index} has no range"))?;
+        if view.get("buffer").and_then(Value::as_u64) != Some(0) {
+            return Err(format!("buffer view {index} lies in another buffer"));
+        }
         let end = start.checked_add(length).filter(|&end| end <= self.bin.len());
         end.map(|end| &self.bin[start..end])
             .ok_or_else(|| format!("buffer view {index} reaches past the end of the file"))
@@ -335,11 +367,27 @@ impl<'a> Reader<'a> {
         let field = |key: &str| a.get(key).and_then(Value::as_u64).and_then(|v| usize::try_from(v).ok());
         let (view, count) =
             field("bufferView").zip(field("count")).ok_or_else(|| format!("accessor {index} has no data"))?;
-        let bytes = self.view(view)?;
+        let is_packed = self.root["bufferViews"][view].get("byteStride").is_none_or(|stride| *stride == json!(width));
+        if !is_packed || a.get("sparse").is_some() {
+            return Err(format!("accessor {index} is sparse or interleaved, which is not read"));
+        }
+        let offset = if a.get("byteOffset").is_some() { field("byteOffset") } else { Some(0) };
+        let bytes = offset.and_then(|offset| self.view(view).map(|bytes| bytes.get(offset..)).transpose());
+        let bytes = bytes.ok_or_else(|| format!("accessor {index} begins past the end of its buffer view"))??;
         let length = count.checked_mul(width).filter(|&l| l <= bytes.len());
         let length =
             length.ok_or_else(|| format!("accessor {index} counts more elements than its buffer view holds"))?;
         Ok((&bytes[..length], count))
+    }
+
+    /// Refuses layers that decode the same bytes again and again: a small file could ask for any memory.
+    fn refuse_shared_images(&self, e: &Extension) -> Result<(), String> {
+        let rays = e.rays.iter().flat_map(|ray| [ray.color, ray.view]);
+        let mut bytes = 0usize;
+        for image in e.layers.iter().map(|layer| layer.image).chain(rays) {
+            bytes = bytes.saturating_add(self.image(image)?.len());
+        }
+        if bytes > self.bin.len() { Err("its layers share images".to_owned()) } else { Ok(()) }
     }
 
     fn floats(&self, index: usize, kind: &str, per: usize) -> Result<Vec<f64>, String> {
@@ -363,7 +411,7 @@ impl<'a> Reader<'a> {
 
     fn snorms(&self, index: Option<usize>, kind: &str, per: usize) -> Result<Vec<f64>, String> {
         let raw = self.shorts(index, SHORT, kind, per)?;
-        Ok(raw.into_iter().map(|v| (f64::from(v.cast_signed()) / 32767.0).max(-1.0)).collect())
+        Ok(raw.into_iter().map(|v| from_snorm(v.cast_signed())).collect())
     }
 
     fn image(&self, index: usize) -> Result<&'a [u8], String> {
@@ -375,6 +423,11 @@ impl<'a> Reader<'a> {
 
 /// The model in `bytes`; `Err` says what is wrong with them.
 pub(crate) fn read(bytes: &[u8]) -> Result<Model, String> {
+    // The reader of the `gltf` crate subtracts its header from this length unchecked.
+    let length = bytes.get(8..12).and_then(|b| b.try_into().ok()).map_or(0, u32::from_le_bytes);
+    if length < HEADER_BYTES {
+        return Err("no binary glTF (its header is cut off or says so)".to_owned());
+    }
     let glb = Glb::from_slice(bytes).map_err(|e| format!("no binary glTF ({e})"))?;
     let root: Value = serde_json::from_slice(&glb.json).map_err(|e| format!("its JSON does not parse ({e})"))?;
     let bin = glb.bin.as_deref().ok_or("it has no binary chunk")?;
@@ -385,9 +438,10 @@ pub(crate) fn read(bytes: &[u8]) -> Result<Model, String> {
     if e.version != VERSION {
         return Err(format!("version {} of the extension; this program reads version {VERSION}", e.version));
     }
-    if e.atlas_size.iter().any(|&n| n == 0 || n > LARGEST_ATLAS) {
+    if !surface::is_atlas_size(e.atlas_size) {
         return Err(format!("an atlas of {:?} texels", e.atlas_size));
     }
+    reader.refuse_shared_images(&e)?;
     let method: Method = e.method.parse()?;
     let mesh = read_mesh(&reader, e.atlas_size)?;
     let appearance =
@@ -500,8 +554,7 @@ fn read_facets(r: &Reader<'_>, e: &Extension) -> Result<Vec<FacetWeights>, Strin
         if rank == 0 || rank > e.layers.len() {
             return Err(format!("facet {n} uses {rank} of {} layers", e.layers.len()));
         }
-        let sites =
-            directions.take(s)?.iter().map(|&d| Vector3::from(d).try_normalize(0.5).unwrap_or_default()).collect();
+        let sites = directions.take(s)?.iter().map(|&d| read_direction(d)).collect();
         let triangles = triangles.take(t)?.iter().map(|t| t.map(u32::from)).collect();
         let edges = edges.take(d)?.iter().map(|t| t.map(u32::from)).collect();
         let complex = DirectionComplex::from_parts(sites, triangles, edges, layout)
@@ -527,11 +580,16 @@ impl<'a, T> Taker<'a, T> {
 
 fn read_lumigraph(r: &Reader<'_>, e: &Extension, mesh: &TexturedMesh) -> Result<Appearance, String> {
     let centers = r.points(e.camera_centers.ok_or("it has no camera centres")?)?;
+    if e.rays.is_empty() {
+        return Err("it has no rays".to_owned());
+    }
     let mut coded = Vec::new();
     for ray in &e.rays {
         coded.push(r.image(ray.color)?.to_vec());
         coded.push(r.image(ray.view)?.to_vec());
     }
+    // Before the surface is baked, one image proves that the atlas is as large as it is said to be.
+    coded.first().map(|image| coding::decode(image, e.atlas_size)).transpose()?;
     let surface = SurfaceTexels::bake(mesh);
     let rays = Lumigraph::decode(centers, coded, &surface)?;
     Ok(Appearance::Lumigraph(rays, surface))

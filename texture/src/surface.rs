@@ -4,6 +4,16 @@ use geometry::TexturedMesh;
 use geometry::atlas::rasterize;
 use nalgebra::{Point3, Vector3};
 
+/// No atlas has more texels, or is wider or higher: what a model holds of one must fit in memory.
+const MOST_TEXELS: usize = 1 << 26;
+const LONGEST_SIDE: usize = 1 << 15;
+
+/// Whether a model may have an atlas of this width and height.
+pub(crate) fn is_atlas_size([width, height]: [usize; 2]) -> bool {
+    let sides = 1..=LONGEST_SIDE;
+    sides.contains(&width) && sides.contains(&height) && width * height <= MOST_TEXELS
+}
+
 /// One entry per texel that carries surface, in row-major order of the atlas.
 #[derive(Clone, Debug)]
 pub struct SurfaceTexels {

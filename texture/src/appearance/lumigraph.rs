@@ -168,7 +168,8 @@ impl Lumigraph {
     fn encode_slot(&self, surface: &SurfaceTexels, slot: usize) -> Option<[Vec<u8>; 2]> {
         let [width, height] = surface.size;
         let mut colors = Image::filled(width, height, [0u8; 3]);
-        let mut views = Image::filled(width, height, [0u8; 3]);
+        // A reader's surface may reach a texel further than ours: there is no ray there.
+        let mut views = Image::filled(width, height, [0xff, 0xff, 0]);
         for (t, &at) in surface.index.iter().enumerate() {
             let k = t * self.rays + slot;
             let [low, high] = self.views[k].to_le_bytes();
