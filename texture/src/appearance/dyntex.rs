@@ -148,9 +148,8 @@ fn facet_weights(bake: &Bake<'_>, facet: usize, rank: usize, decoded: &[Image<[f
     let mut table = Vec::with_capacity(groups.len() * rank);
     for group in &groups {
         table.push(1.0);
-        (0..rank - 1).for_each(|k| {
-            table.push(group.iter().map(|&j| coefficients[(k, j)]).sum::<f64>() as f32 / group.len() as f32)
-        });
+        let mean = |k: usize| group.iter().map(|&j| coefficients[(k, j)]).sum::<f64>() / group.len() as f64;
+        table.extend((0..rank - 1).map(|k| mean(k) as f32));
     }
     let sites: Vec<_> = groups.iter().map(|g| own[g[0]]).collect();
     FacetWeights {
