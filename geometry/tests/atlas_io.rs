@@ -80,7 +80,8 @@ fn broken_files_are_named_with_a_remedy() {
         ("obj", "v 0 0 0\nf 1 2 3\n".to_owned(), "OBJ"),
         ("obj", "v 0 0 0\n".to_owned(), "no faces"),
         ("obj", "v 0 0 inf\nv 1 0 0\nv 0 1 0\nf 1 2 3\n".to_owned(), "not finite"),
-        ("glb", "glTF".to_owned(), "GLB"),
+        ("glb", "glTF".to_owned(), "header"),
+        ("glb", "glTF\u{2}\0\0\0\u{5}\0\0\0".to_owned(), "header"),
         ("glb", "no".to_owned(), "glTF"),
         ("stl", "solid".to_owned(), "known kind"),
     ];
@@ -89,6 +90,15 @@ fn broken_files_are_named_with_a_remedy() {
         assert!(message.contains(expected) && message.contains("mesh."), "{message}");
         assert!(message.contains("; "), "no remedy: {message}");
     }
+}
+
+#[test]
+fn a_glb_whose_positions_are_missing_is_refused() {
+    let json = r#"{"asset":{"version":"2.0"},"meshes":[{"primitives":[{"attributes":{"POSITION":7}}]}]}  "#;
+    let chunk = [&(json.len() as u32).to_le_bytes()[..], b"JSON", json.as_bytes()].concat();
+    let bytes = [b"glTF", &2u32.to_le_bytes()[..], &(12 + chunk.len() as u32).to_le_bytes(), &chunk].concat();
+    let message = read_bytes("glb", &bytes).unwrap_err().to_string();
+    assert!(message.contains("accessor 7 is missing"), "{message}");
 }
 
 #[test]

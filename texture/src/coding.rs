@@ -17,15 +17,16 @@ const LUMINANCE: [u16; 64] = [
     72, 92, 95, 98, 112, 100, 103, 99,
 ];
 
-/// Share of the annex K table and of a flat one in ours. Flat minimises squared error, the annex
-/// favours the eye; measured, the mixture costs least for the same mean absolute error.
+/// Share of a flat table in ours, the rest being annex K. Flat minimises squared error, the annex favours
+/// the eye; on the temple ring at a step of 0.07, shares of 0, ½ and 1 gave 3.691, 3.690 and 3.687 % error in
+/// 2.43, 2.36 and 2.62 MB.
 const FLATNESS: f64 = 0.5;
 
 /// Level of a flat table of the same coarseness as annex K for low frequencies.
 const FLAT_LEVEL: f64 = 24.0;
 
-/// How much coarser chroma is quantised than luma. Chroma keeps full resolution: with halved chroma the
-/// encoder's optimised Huffman tables come out wrong (jpeg-encoder 0.7.1), and those save more.
+/// How much coarser chroma is quantised than luma. Chroma keeps full resolution: coarser tables buy the
+/// same, and halved chroma with optimised Huffman tables came back wrong from our decoder, like below.
 const CHROMA: f64 = 2.0;
 
 /// JPEG bytes of `image`. `step` is the coarseness of quantisation in 8-bit levels of the *stored*

@@ -26,8 +26,6 @@ pub(crate) struct Completed {
     pub(crate) views: Vec<usize>,
     /// Row-major, texels × views.
     pub(crate) colors: Vec<[f32; 3]>,
-    /// How much each entry was observed rather than filled, in [0, 1]; same shape.
-    pub(crate) trust: Vec<f32>,
     /// Whether any view saw the texel; rows of unseen ones hold zeros.
     pub(crate) seen: Vec<bool>,
 }
@@ -37,12 +35,7 @@ pub(crate) fn complete(samples: &Samples, directions: &[Vector3<f64>]) -> Comple
     let texels = samples.rows.len() / samples.views.max(1);
     let views = views_of_facet(samples, texels);
     let lenders: Vec<Vec<(usize, f32)>> = views.iter().map(|&j| by_angle(j, directions)).collect();
-    let mut done = Completed {
-        colors: vec![[0.0; 3]; texels * views.len()],
-        trust: vec![0.0; texels * views.len()],
-        seen: vec![false; texels],
-        views,
-    };
+    let mut done = Completed { colors: vec![[0.0; 3]; texels * views.len()], seen: vec![false; texels], views };
     let width = done.views.len();
     for i in 0..texels {
         let row = samples.row(i);
@@ -54,7 +47,6 @@ pub(crate) fn complete(samples: &Samples, directions: &[Vector3<f64>]) -> Comple
             let own = row[j];
             let trust = (own.weight / TRUSTED).min(1.0);
             let filled = if trust < 1.0 { lent(row, &lenders[k]).unwrap_or(own.color) } else { own.color };
-            done.trust[i * width + k] = trust;
             done.colors[i * width + k] = std::array::from_fn(|c| trust * own.color[c] + (1.0 - trust) * filled[c]);
         }
     }

@@ -3,7 +3,9 @@
 //! A texel with surface point X and normal n is observed in view j with weight
 //! `w = visibility · α(m) · smoothstep(0.1, 0.25, cos θ)`, where m is the pixel X lands on, α the
 //! eroded matte and θ the angle between n and the direction to the camera. Below cos θ = 0.1 (84°) a
-//! texel's data is stretched over so few pixels that it counts as missing. Colour is a Catmull–Rom
+//! texel's data is stretched over so few pixels that it counts as missing. A texel whose own triangle
+//! faces away is hidden, whatever its smooth normal says: beside a crease that normal leans towards
+//! cameras on the other side, and the slack of the depth test would take their colours. Colour is a Catmull–Rom
 //! fetch, clamped to the pixels around so that it cannot overshoot at contours.
 //!
 //! Cost per texel and view: one projection, one depth look-up, 16 pixels.
@@ -42,6 +44,8 @@ pub(crate) struct Observer<'a> {
     /// Matte after erosion; its 128 level bounds what may be used.
     usable: Image<u8>,
     slack: f64,
+    /// Whether each face of the mesh turns its outside to the camera.
+    faces_camera: Vec<bool>,
 }
 
 /// A texel as one photograph shows it.
@@ -57,13 +61,16 @@ impl<'a> Observer<'a> {
     /// Prepares `view` for a proxy; `mask_erode_px` is taken off its silhouette first.
     pub(crate) fn new(view: &'a View, mesh: &Mesh, mask_erode_px: f64) -> Self {
         let depth = DepthMap::render(mesh, &view.camera);
+        let center = view.camera.center();
+        let faces_camera = |face| mesh.face_area_vector(face).dot(&(center - mesh.corners(face)[0])) > 0.0;
         Self {
             view,
             projection: view.camera.projection_matrix(),
-            center: view.camera.center(),
+            center,
             nearest_depth: minimum_3x3(&depth.depth),
             usable: capture::erode(&view.matte, mask_erode_px),
             slack: DEPTH_SLACK * mesh.aabb().map_or(0.0, |b| b.diagonal()),
+            faces_camera: (0..mesh.faces.len()).map(faces_camera).collect(),
         }
     }
 
@@ -77,13 +84,13 @@ impl<'a> Observer<'a> {
         self.center
     }
 
-    /// What the photograph says about a surface point.
-    pub(crate) fn observe(&self, point: &Point3<f64>, normal: &Vector3<f64>) -> Observation {
+    /// What the photograph says about a point of a face.
+    fn observe(&self, face: u32, point: &Point3<f64>, normal: &Vector3<f64>) -> Observation {
         let to_camera = self.center - point;
         let distance = to_camera.norm();
         let cosine = normal.dot(&to_camera) / distance;
         let facing = smoothstep(GRAZING, cosine);
-        if facing <= 0.0 {
+        if facing <= 0.0 || !self.faces_camera[face as usize] {
             return Observation::default();
         }
         let Some((pixel, depth)) = self.project(point) else { return Observation::default() };
@@ -130,8 +137,9 @@ impl Samples {
         let views = observers.len();
         let mut rows = vec![Observation::default(); texels.len() * views];
         for (row, &t) in rows.chunks_exact_mut(views.max(1)).zip(texels) {
-            let (point, normal) = (&surface.positions[t as usize], &surface.normals[t as usize]);
-            row.iter_mut().zip(observers).for_each(|(cell, o)| *cell = o.observe(point, normal));
+            let (face, point) = (surface.faces[t as usize], &surface.positions[t as usize]);
+            let normal = &surface.normals[t as usize];
+            row.iter_mut().zip(observers).for_each(|(cell, o)| *cell = o.observe(face, point, normal));
         }
         Self { views, rows }
     }

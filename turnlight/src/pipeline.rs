@@ -63,7 +63,9 @@ pub fn shape(
     }
     let fine = hull(views, aabb, options, stages)?;
     let texel = texel_size(views, &fine)?;
-    let coarse = stages.run("simplify", |_| geometry::simplify(&fine, &simplify_options(&fine, texel)))?.mesh;
+    let mut coarse = stages.run("simplify", |_| geometry::simplify(&fine, &simplify_options(&fine, texel)))?.mesh;
+    // Thin places break into specks when simplified; each would cost two charts.
+    coarse.remove_small_parts(HullOptions::default().least_part);
     unwrap(&coarse, texel, stages)
 }
 

@@ -148,9 +148,8 @@ fn facet_weights(bake: &Bake<'_>, facet: usize, rank: usize, decoded: &[Image<[f
     let mut table = Vec::with_capacity(groups.len() * rank);
     for group in &groups {
         table.push(1.0);
-        (0..rank - 1).for_each(|k| {
-            table.push(group.iter().map(|&j| coefficients[(k, j)]).sum::<f64>() as f32 / group.len() as f32)
-        });
+        let mean = |k: usize| group.iter().map(|&j| coefficients[(k, j)]).sum::<f64>() / group.len() as f64;
+        table.extend((0..rank - 1).map(|k| mean(k) as f32));
     }
     let sites: Vec<_> = groups.iter().map(|g| own[g[0]]).collect();
     FacetWeights {
@@ -171,4 +170,67 @@ fn refit(completed: &Completed, columns: &[Vec<[f32; 3]>]) -> DMatrix<f64> {
     normal += DMatrix::from_diagonal(&DVector::from_element(rank, ridge));
     let right = basis * data.transpose();
     normal.cholesky().map_or_else(|| DMatrix::zeros(rank, views), |c| c.solve(&right))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Colours without structure, nothing missing.
+    fn noise(texels: usize, views: usize) -> Completed {
+        let mixed = |i: usize| (i as u64 + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15).rotate_left(29);
+        let value = |i: usize| (mixed(mixed(i) as usize) >> 40) as f32 / 65_793.0;
+        let colors = (0..texels * views).map(|i| [0, 1, 2].map(|c| value(3 * i + c))).collect();
+        Completed { views: (0..views).collect(), colors, seen: vec![true; texels] }
+    }
+
+    fn columns(data: &Completed, most: usize, tolerance: f64) -> Vec<Vec<[f32; 3]>> {
+        let mean = row_means(data);
+        let layers = components(&centred(data, &mean), most, tolerance);
+        std::iter::once(mean).chain(layers).collect()
+    }
+
+    fn largest_residual(data: &Completed, columns: &[Vec<[f32; 3]>]) -> f64 {
+        let y = refit(data, columns);
+        let views = data.views.len();
+        let shown = |i: usize, j: usize, c: usize| {
+            let moved: f64 = (1..columns.len()).map(|k| y[(k - 1, j)] * f64::from(columns[k][i][c])).sum();
+            f64::from(columns[0][i][c]) + moved
+        };
+        let entries = (0..data.colors.len()).flat_map(|e| (0..3).map(move |c| (e / views, e % views, c)));
+        entries.map(|(i, j, c)| (shown(i, j, c) - f64::from(data.colors[i * views + j][c])).abs()).fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn all_components_give_the_data_back() {
+        // METHODS G.9 (4): m − 1 components and the mean are the m views.
+        for (texels, views) in [(50, 12), (3, 12), (200, 2)] {
+            let data = noise(texels, views);
+            let columns = columns(&data, views - 1, 0.0);
+            assert!(columns.len() <= views);
+            let residual = largest_residual(&data, &columns);
+            assert!(residual < 1e-2, "{residual} of {texels} texels in {views} views");
+        }
+    }
+
+    #[test]
+    fn coefficients_have_unit_rms_and_layers_fall_in_strength() {
+        let data = noise(80, 10);
+        let columns = columns(&data, 9, 0.0);
+        let y = refit(&data, &columns);
+        for k in 0..9 {
+            let rms = (y.row(k).norm_squared() / 10.0).sqrt();
+            assert!((rms - 1.0).abs() < 1e-3, "{rms} of layer {k}");
+        }
+        let energy = |k: usize| columns[k].as_flattened().iter().map(|v| v * v).sum::<f32>();
+        assert!((1..9).all(|k| energy(k) >= energy(k + 1)));
+    }
+
+    #[test]
+    fn equal_views_have_no_component() {
+        let one = noise(30, 1);
+        let colors = one.colors.iter().flat_map(|&c| [c; 6]).collect();
+        let data = Completed { views: (0..6).collect(), colors, seen: vec![true; 30] };
+        assert_eq!(columns(&data, 5, 0.01).len(), 1);
+    }
 }

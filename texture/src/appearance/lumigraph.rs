@@ -38,11 +38,14 @@ pub struct Lumigraph {
     pub coded: Vec<Vec<u8>>,
 }
 
+/// A view and the colour it gives a texel.
+type Ray = (u16, [u8; 3]);
+
 /// Fits the lumigraph; also counts texels without any ray.
 pub(crate) fn fit(bake: &Bake<'_>, options: &FitOptions) -> Option<(Lumigraph, usize)> {
     let rays = options.layers.max(1);
     let count = bake.surface.len();
-    let per_facet: Vec<Vec<Vec<(u16, [u8; 3])>>> =
+    let per_facet: Vec<Vec<Vec<Ray>>> =
         (0..bake.facets.texels.len()).into_par_iter().map(|f| facet_rays(bake, f, rays)).collect();
     let mut colors = vec![[0u8; 3]; count * rays];
     let mut views = vec![NO_RAY; count * rays];
@@ -62,14 +65,14 @@ pub(crate) fn fit(bake: &Bake<'_>, options: &FitOptions) -> Option<(Lumigraph, u
     Some((lumigraph, unseen))
 }
 
-fn facet_rays(bake: &Bake<'_>, facet: usize, rays: usize) -> Vec<Vec<(u16, [u8; 3])>> {
+fn facet_rays(bake: &Bake<'_>, facet: usize, rays: usize) -> Vec<Vec<Ray>> {
     let samples = bake.samples(facet);
     let directions = bake.directions(facet);
     (0..bake.facets.texels[facet].len()).map(|i| choose(samples.row(i), &directions, rays)).collect()
 }
 
 /// Up to `rays` observations: the best seen one, then always the one farthest from those chosen.
-fn choose(row: &[Observation], directions: &[Vector3<f64>], rays: usize) -> Vec<(u16, [u8; 3])> {
+fn choose(row: &[Observation], directions: &[Vector3<f64>], rays: usize) -> Vec<Ray> {
     let mut open: Vec<(usize, f64)> =
         (0..row.len()).filter(|&j| row[j].weight > 0.0).map(|j| (j, f64::INFINITY)).collect();
     let mut chosen: Vec<usize> = Vec::new();

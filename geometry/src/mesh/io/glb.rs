@@ -13,6 +13,11 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Parsed, Fault> {
     if !bytes.starts_with(b"glTF") {
         return Err(fault("does not begin with `glTF`", "check that the file is a GLB file"));
     }
+    // The reader of the `gltf` crate subtracts the header's 12 bytes from this length unchecked.
+    if bytes.get(8..12).and_then(|b| b.try_into().ok()).map_or(0, u32::from_le_bytes) < 12 {
+        return Err(fault("has a header that is cut off or says so", EXPORT_AGAIN));
+    }
+    refuse_wild_positions(bytes)?;
     let file = gltf::Gltf::from_slice(bytes).map_err(|e| fault(format!("is not a GLB file: {e}"), EXPORT_AGAIN))?;
     let blob = file.blob.as_deref().unwrap_or_default();
     let mut reader = Reader { blob, parsed: Parsed { split: true, ..Parsed::default() }, uvs: true, visits: 0 };
@@ -26,6 +31,18 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Parsed, Fault> {
         reader.parsed.corner_uvs.clear();
     }
     Ok(reader.parsed)
+}
+
+/// The validation of `gltf-json` (1.4.1) looks positions up before it has checked that they are there.
+fn refuse_wild_positions(bytes: &[u8]) -> Result<(), Fault> {
+    let no_file = |e: &dyn std::fmt::Display| fault(format!("is not a GLB file: {e}"), EXPORT_AGAIN);
+    let glb = gltf::Glb::from_slice(bytes).map_err(|e| no_file(&e))?;
+    let root = json::Root::from_slice(&glb.json).map_err(|e| no_file(&e))?;
+    let attributes = root.meshes.iter().flat_map(|mesh| &mesh.primitives).flat_map(|p| p.attributes.values());
+    match attributes.map(json::Index::value).find(|&index| index >= root.accessors.len()) {
+        Some(index) => Err(fault(format!("accessor {index} is missing"), EXPORT_AGAIN)),
+        None => Ok(()),
+    }
 }
 
 struct Reader<'a> {
