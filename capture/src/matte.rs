@@ -36,7 +36,7 @@ pub fn is_binary(matte: &Image<u8>) -> bool {
 
 /// Gives a hard-edged matte a ramp, by a Gaussian of `sigma` pixels, so that its contour at half level
 /// runs between the steps of the pixel grid. Curves shrink by σ²κ/2: keep `sigma` near 0.7 to 1
-/// (METHODS B.3). Outside the frame the border pixel is repeated.
+///. Outside the frame the border pixel is repeated.
 pub fn smooth(matte: &Image<u8>, sigma: f64) -> Image<u8> {
     if sigma.is_nan() || sigma <= 0.0 {
         return matte.clone();

@@ -99,7 +99,7 @@ impl Key {
                 Self::Distance(backdrop) => (0..3).map(|c| (p[c] - backdrop[c]).abs()).fold(0.0, f32::max),
             }
         });
-        // Noise and JPEG blocks; METHODS B.3 asks for no more than 0.7.
+        // Noise and JPEG blocks; sub-pixel contours ask for no more than 0.7.
         blur(&score, 0.6)
     }
 }
@@ -261,7 +261,7 @@ fn decided(score: &Image<f32>, level: f32, fill_level: f32, camera: &Camera, hul
     without_pinholes(&without_specks(&mask))
 }
 
-/// Fills holes smaller than a two-thousandth of the object (METHODS B.2); real openings are larger.
+/// Fills holes smaller than a two-thousandth of the object; real openings are larger.
 fn without_pinholes(mask: &Image<u8>) -> Image<u8> {
     let object = mask.pixels().iter().filter(|v| **v >= 128).count();
     let (sizes, labels) = components(&mask.map(|v| v < 128));

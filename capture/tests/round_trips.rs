@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 fn temple_lens() -> Intrinsics {
     let distortion = Distortion::default();
-    // METHODS A.1, moved by the half pixel of our origin.
+    // Moved by the half pixel of our origin.
     Intrinsics { fx: 1520.4, fy: 1525.9, skew: 0.0, cx: 302.82, cy: 247.37, distortion, width: 640, height: 480 }
 }
 
@@ -23,7 +23,7 @@ fn camera(i: usize) -> Camera {
 fn temple_projects_as_computed_by_hand() {
     let camera = Camera { intrinsics: temple_lens(), rotation: Matrix3::identity(), translation: Vector3::zeros() };
     let pixel = camera.project(&Point3::new(0.01, -0.02, 0.5)).unwrap().pixel;
-    // METHODS A.7.1: (332.728, 185.834) with integer centres.
+    // (332.728, 185.834) with integer centres.
     assert!((pixel - Point2::new(333.228, 186.334)).norm() < 1e-9);
     for z in [0.0, -0.5, f64::NAN] {
         assert!(camera.project(&Point3::new(0.01, -0.02, z)).is_none(), "{z}");

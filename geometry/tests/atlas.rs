@@ -1,4 +1,4 @@
-//! Known answers and invariants of the atlas (METHODS.md E.3, E.7).
+//! Known answers and invariants of the atlas.
 
 #![allow(clippy::unwrap_used, reason = "a helper that fails fails its test")]
 
@@ -93,7 +93,7 @@ fn a_hull_unfolds_into_few_charts() {
     check_atlas(&u, 4.0);
     assert_eq!(u.mesh.mesh.faces.len() + u.report.dropped_degenerate, mesh.faces.len());
     assert!((10..=80).contains(&u.report.charts), "{} charts", u.report.charts);
-    // 0.64 to 0.65 at 1024² with 4 texels of gutter; xatlas reaches 0.638 on a hull (PEER-PERF row 6).
+    // 0.64 to 0.65 at 1024² with 4 texels of gutter; xatlas reaches 0.638 on a hull.
     assert!(u.report.fill_ratio >= 0.63, "{}", u.report.fill_ratio);
 }
 
@@ -214,7 +214,6 @@ fn the_atlas_does_not_depend_on_threads_or_units() {
     }
 }
 
-/// METHODS.md L24.
 #[test]
 fn broken_meshes_are_refused_or_repaired_with_counts() {
     let options = UnwrapOptions::new(0.02);
@@ -246,7 +245,7 @@ fn broken_meshes_are_refused_or_repaired_with_counts() {
     }
 }
 
-/// METHODS.md L25 to L27: slivers, single triangles, rings, spirals, crowds.
+/// Slivers, single triangles, rings, spirals, crowds.
 #[test]
 fn hard_shapes_unfold() {
     let triangle = Mesh {
@@ -290,7 +289,6 @@ fn hard_shapes_unfold() {
     }
 }
 
-/// METHODS.md L26.
 #[test]
 fn a_crowd_of_tiny_charts_fits_or_is_refused_with_the_size_needed() {
     let mut mesh = Mesh::default();
@@ -341,7 +339,6 @@ fn a_simplified_manifold_is_one() {
     assert!((ratio - 1.0).abs() < 0.01, "{ratio}");
 }
 
-/// METHODS.md L28.
 #[test]
 fn simplifying_degenerate_meshes_is_refused_or_harmless() {
     let options = SimplifyOptions { target_faces: 10, max_error: None };

@@ -28,7 +28,7 @@ fn cube_box(half: f64) -> Option<Aabb> {
     Some(Aabb { min: Point3::new(-half, -half, -half), max: Point3::new(half, half, half) })
 }
 
-/// METHODS C.10: views spread over half a turn across the axis make of every section of a sphere the
+/// Views spread over half a turn across the axis make of every section of a sphere the
 /// regular 2n-gon around it, so the volume grows by (2n/π) tan(π/2n).
 #[test]
 fn orthographic_ring_gives_the_regular_polygon() {

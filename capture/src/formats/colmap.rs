@@ -101,7 +101,7 @@ fn read_frame(file: &Path, folder: &Path, cameras: &Cameras, pose: &Pose<'_>) ->
         .ok_or_else(|| invalid(format!("camera {} is not in cameras", pose.camera), "export the model again"))?;
     let [w, x, y, z, tx, ty, tz] = pose.numbers;
     let q = Quaternion::new(w, x, y, z);
-    // METHODS A.1; the negated form refuses NaN too.
+    // The negated form refuses NaN too.
     if !(q.norm() >= 1e-6 && q.norm().is_finite()) {
         return Err(invalid("its quaternion has no length".into(), "export the model again"));
     }

@@ -185,7 +185,7 @@ fn capture(frames: Vec<Frame>) -> Capture {
     Capture { frames, aabb: None, unit: None, mask_source: MaskSource::Automatic }
 }
 
-/// Largest deviation of `R Rᵀ` from 1 that rounding in a file can explain (METHODS L.1).
+/// Largest deviation of `R Rᵀ` from 1 that rounding in a file can explain.
 const ROTATION_TOLERANCE: f64 = 1e-2;
 
 /// Longest side of an image in pixels that is believed.

@@ -91,7 +91,7 @@ pub(super) fn projection_frame(
 }
 
 /// `P = s K [R | t]` with `K` upper triangular, its diagonal positive and `K₂₂ = 1`, `det R = 1`
-/// (METHODS A.1; Hartley and Zisserman, Multiple View Geometry, A4.1.1). `None` for a singular matrix.
+/// (Hartley and Zisserman, Multiple View Geometry, A4.1.1). `None` for a singular matrix.
 pub(super) fn decompose(projection: &Matrix3x4<f64>) -> Option<(Matrix3<f64>, Matrix3<f64>, Vector3<f64>)> {
     let left = projection.fixed_columns::<3>(0).into_owned();
     let determinant = left.determinant();

@@ -33,7 +33,7 @@ fn transforms(keys: &str, matrix: &str) -> String {
 
 #[test]
 fn opengl_camera_looks_along_minus_z() {
-    // METHODS A.7.2, corner origin: cx = 4 is the middle of 8 columns.
+    // Corner origin: cx = 4 is the middle of 8 columns.
     let text = transforms(r#""camera_angle_x": 1.5707963267948966,"#, IDENTITY);
     let dir = folder(&[("transforms_train.json", text.as_bytes()), ("a.png", b"")]);
     let camera = Capture::read(dir.path()).unwrap().frames[0].camera;

@@ -3,7 +3,7 @@
 use crate::error::GeometryError;
 use crate::mesh::Mesh;
 
-/// Smallest area of a face against the squared diagonal of the mesh (METHODS.md D.3).
+/// Smallest area of a face against the squared diagonal of the mesh.
 const MIN_AREA: f64 = 1e-12;
 
 /// A mesh that segmentation and flattening can rely on.

@@ -151,7 +151,7 @@ mod tests {
             let crossed = crossed.filter(|(c, d)| (pattern >> c ^ pattern >> d) & 1 == 1).count();
             assert_eq!(loops(pattern).iter().map(Vec::len).sum::<usize>(), crossed);
         }
-        // METHODS C.5, enumerated independently.
+        // Enumerated independently.
         assert_eq!(counts[3..], [144, 66, 72, 52, 24]);
     }
 

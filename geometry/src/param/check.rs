@@ -1,4 +1,4 @@
-//! What is wrong with a map, exactly enough to accept or split (METHODS.md E.4).
+//! What is wrong with a map, exactly enough to accept or split.
 
 use super::patch::Patch;
 use nalgebra::Point2;

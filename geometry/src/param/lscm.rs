@@ -12,7 +12,7 @@ use super::solve::{Cholesky, Hermitian, dissect};
 use nalgebra::{Complex, Point2};
 
 /// Smallest `d_T` against the mean: a sliver's weight grows as 1/d_T and would drown all others
-/// (METHODS.md E.3).
+///.
 const MIN_AREA_RATIO: f64 = 1e-10;
 
 /// A conformal map of a disc; `None` where the system has no solution to working precision.
@@ -114,7 +114,7 @@ mod tests {
         check::judge(patch, &flat)
     }
 
-    /// METHODS.md E.3 (i): a plane stays itself up to similarity.
+    /// Known map: a plane stays itself up to similarity.
     #[test]
     fn a_plane_is_reproduced() {
         let q = quality(&disc(12, |r, a| Point3::new(r * a.cos(), 2.0 * r * a.sin(), 0.3 * r * a.cos())));
@@ -122,7 +122,7 @@ mod tests {
         assert!((q.stretch_l2 - 1.0).abs() < 1e-12 && q.shear < 1.0 + 1e-7, "{q:?}");
     }
 
-    /// METHODS.md E.3 (ii): a cone of half-angle 45° develops exactly where its faces do; the mesh of
+    /// Known map: a cone of half-angle 45° develops exactly where its faces do; the mesh of
     /// 72 sectors stands for it within 1 %.
     #[test]
     fn a_cone_patch_develops() {
@@ -134,7 +134,7 @@ mod tests {
         assert!((q.stretch_l2 - 1.0).abs() < 1e-3 && q.shear < 1.01, "{q:?}");
     }
 
-    /// METHODS.md E.3 (iii): a hemisphere is mapped conformally, about stereographically: areas 1 to 4.
+    /// Known map: a hemisphere is mapped conformally, about stereographically: areas 1 to 4.
     #[test]
     fn a_hemisphere_is_conformal() {
         let half = |r: f64, a: f64| {

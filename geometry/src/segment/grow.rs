@@ -3,7 +3,7 @@
 //!
 //! The bend of a chart is the L2,1 error of its mean normal (Cohen-Steiner, Alliez, Desbrun 2004),
 //! `Σ A |n - N|² = 2 (A - |Σ A n|)`: two sums per chart tell it, whatever the chart's size. Hull
-//! creases are noisy, so no feature lines are traced (METHODS.md E.1 step 2); a crease shows as a bend.
+//! creases are noisy, so no feature lines are traced; a crease shows as a bend.
 //! Cost O(n log n) for n faces.
 
 use super::FaceShapes;

@@ -203,7 +203,7 @@ mod tests {
 
     #[test]
     fn all_components_give_the_data_back() {
-        // METHODS G.9 (4): m − 1 components and the mean are the m views.
+        // m − 1 components and the mean are the m views.
         for (texels, views) in [(50, 12), (3, 12), (200, 2)] {
             let data = noise(texels, views);
             let columns = columns(&data, views - 1, 0.0);
