@@ -1,5 +1,4 @@
-//! How long does a hull of 20 000 faces take to unfold, and what takes the time? (xatlas: 13.4 CPU-s,
-//! xatlas.)
+//! How long does a hull of 20 000 faces take to unfold, and what takes the time?
 
 #[path = "../tests/atlas_shapes/mod.rs"]
 mod shapes;
