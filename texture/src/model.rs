@@ -111,7 +111,7 @@ impl FromStr for Method {
 
 impl Default for FitOptions {
     fn default() -> Self {
-        Self { layers: 20, mask_erode_px: 0.25, tolerance: 0.5, quantiser: 0.07, facet_texels: 1024 }
+        Self { layers: 20, mask_erode_px: 0.25, tolerance: 0.5, quantiser: 0.05, facet_texels: 1024 }
     }
 }
 
