@@ -35,7 +35,7 @@ const SSIM_RADIUS: usize = 5;
 const LUMA: [f64; 3] = [0.299, 0.587, 0.114];
 
 /// The figures of one view; see the module's table.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct ViewScore {
     /// Mean absolute difference over the mask, % of 255.
     pub error_mean_pct: f64,

@@ -77,30 +77,14 @@ pub struct MethodFigures {
 pub struct ViewFigures {
     /// Its position in the capture.
     pub view: usize,
-    /// Mean absolute error over the reference mask, % of 255.
-    pub error_mean_pct: f64,
-    /// The same over the union of both masks.
-    pub error_union_pct: f64,
-    /// The same inside both masks, away from the rim.
-    pub error_inner_pct: Option<f64>,
-    /// PSNR over the mask.
-    pub psnr_db: f64,
-    /// PSNR over the frame.
-    pub psnr_full_db: f64,
-    /// Structural similarity over the mask.
-    pub ssim: f64,
-    /// Intersection over union of the masks.
-    pub mask_iou: f64,
-    /// Mask not rendered, % of the mask.
-    pub hole_pct: f64,
-    /// Rendered outside the mask, % of the mask.
-    pub spill_pct: f64,
+    /// The score, under its own names.
+    #[serde(flatten)]
+    pub score: ViewScore,
 }
 
 impl ViewFigures {
     pub(super) fn new(view: usize, score: &ViewScore) -> Self {
-        Self {
-            view,
+        let score = ViewScore {
             error_mean_pct: round6(score.error_mean_pct),
             error_union_pct: round6(score.error_union_pct),
             error_inner_pct: score.error_inner_pct.map(round6),
@@ -110,7 +94,8 @@ impl ViewFigures {
             mask_iou: round6(score.mask_iou),
             hole_pct: round6(score.hole_pct),
             spill_pct: round6(score.spill_pct),
-        }
+        };
+        Self { view, score }
     }
 }
 
@@ -119,21 +104,21 @@ impl MethodFigures {
         let views = judged.views;
         let over = |figure: fn(&ViewFigures) -> f64| views.iter().map(figure).collect::<Vec<f64>>();
         let mean_of = |figure: fn(&ViewFigures) -> f64| round6(mean(&over(figure)));
-        let errors = over(|v| v.error_mean_pct);
-        let inner: Vec<f64> = views.iter().filter_map(|v| v.error_inner_pct).collect();
+        let errors = over(|v| v.score.error_mean_pct);
+        let inner: Vec<f64> = views.iter().filter_map(|v| v.score.error_inner_pct).collect();
         Self {
             method: method.name(),
             error_mean_pct: round6(mean(&errors)),
             error_max_pct: round6(errors.iter().copied().fold(0.0, f64::max)),
             error_variance: round6(variance(&errors)),
-            error_union_pct: mean_of(|v| v.error_union_pct),
+            error_union_pct: mean_of(|v| v.score.error_union_pct),
             error_inner_pct: (!inner.is_empty()).then(|| round6(mean(&inner))),
-            psnr_db: mean_of(|v| v.psnr_db),
-            psnr_full_db: mean_of(|v| v.psnr_full_db),
-            ssim: mean_of(|v| v.ssim),
-            mask_iou: mean_of(|v| v.mask_iou),
-            hole_pct: mean_of(|v| v.hole_pct),
-            spill_pct: mean_of(|v| v.spill_pct),
+            psnr_db: mean_of(|v| v.score.psnr_db),
+            psnr_full_db: mean_of(|v| v.score.psnr_full_db),
+            ssim: mean_of(|v| v.score.ssim),
+            mask_iou: mean_of(|v| v.score.mask_iou),
+            hole_pct: mean_of(|v| v.score.hole_pct),
+            spill_pct: mean_of(|v| v.score.spill_pct),
             seam: judged.seam,
             temporal: judged.temporal,
             bytes: cost.bytes,

@@ -60,7 +60,7 @@ fn push_stages(page: &mut String, comparison: &Comparison) {
 /// The views with the smallest, the middle and the largest error of the last method.
 fn shown_views(comparison: &Comparison) -> Vec<usize> {
     let mut views = comparison.methods.last().map(|m| m.views.clone()).unwrap_or_default();
-    views.sort_by(|a, b| a.error_mean_pct.total_cmp(&b.error_mean_pct));
+    views.sort_by(|a, b| a.score.error_mean_pct.total_cmp(&b.score.error_mean_pct));
     let mut shown: Vec<usize> = match views.len() {
         0 => Vec::new(),
         n => [n - 1, n / 2, 0].iter().map(|&i| views[i].view).collect(),

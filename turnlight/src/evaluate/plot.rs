@@ -19,7 +19,7 @@ pub(super) fn error_per_view(comparison: &Comparison) -> Result<String, Error> {
 }
 
 fn draw(comparison: &Comparison, svg: &mut String) -> Result<(), Box<dyn std::error::Error>> {
-    let errors = comparison.methods.iter().flat_map(|m| m.views.iter().map(|v| v.error_mean_pct));
+    let errors = comparison.methods.iter().flat_map(|m| m.views.iter().map(|v| v.score.error_mean_pct));
     let top = errors.fold(1.0_f64, f64::max) * 1.1;
     let last = comparison.test.last().copied().unwrap_or(0) + 1;
     let root = SVGBackend::with_string(svg, (960, 320)).into_drawing_area();
@@ -31,7 +31,7 @@ fn draw(comparison: &Comparison, svg: &mut String) -> Result<(), Box<dyn std::er
         .build_cartesian_2d(0..last, 0.0..top)?;
     chart.configure_mesh().x_desc("view").y_desc("error, % of 255").draw()?;
     for (method, color) in comparison.methods.iter().zip(COLORS.iter().cycle()) {
-        let points = method.views.iter().map(|v| (v.view, v.error_mean_pct));
+        let points = method.views.iter().map(|v| (v.view, v.score.error_mean_pct));
         let line = LineSeries::new(points, color.stroke_width(2)).point_size(2);
         chart
             .draw_series(line)?
