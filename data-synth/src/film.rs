@@ -214,6 +214,7 @@ pub(crate) fn decode(srgb: f32) -> f32 {
 mod tests {
     use super::*;
     use crate::light::Sky;
+    use crate::material::Finish;
     use crate::scene::Paint;
     use crate::shape::{corner_normals, sphere};
     use crate::turntable::{Layout, cameras, stations};
@@ -222,7 +223,8 @@ mod tests {
     fn matte_of_a_sphere_has_the_area_of_its_outline() {
         // A sphere of radius r seen from d shows the disk tan² = r² / (d² − r²) on the image plane.
         let mesh = sphere(0.1, 200);
-        let world = World::new(&mesh, &corner_normals(&mesh, 1.0), &[], Paint::Plain(Vec3::repeat(0.5)), None);
+        let world =
+            World::new(&mesh, &corner_normals(&mesh, 1.0), &[], Paint::Plain(Vec3::repeat(0.5)), vec![Finish::Matt]);
         let stations = stations(&Layout::Rings { elevations_deg: vec![0.0] }, 1, 0).unwrap();
         let camera = cameras(&stations, &mesh, &mesh.aabb().unwrap(), [128, 96])[0];
         let rig = LightRig { sky: Sky::uniform(1.0), lights: vec![] };

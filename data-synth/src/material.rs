@@ -35,6 +35,15 @@ pub(crate) struct Coat {
     mean_albedo: f32,
 }
 
+/// What a part of a scene is made of; its colour is the scene's paint.
+#[derive(Clone, Debug)]
+pub(crate) enum Finish {
+    /// Lambertian; the paint is its reflectance.
+    Matt,
+    /// A dielectric coat over a Lambertian base of the paint's reflectance.
+    Glazed(Coat),
+}
+
 /// What light meets at a point.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Surface<'a> {
@@ -53,6 +62,13 @@ pub(crate) struct Scatter {
     pub(crate) weight: Vec3,
     /// Density in solid angle.
     pub(crate) pdf: f32,
+}
+
+impl Finish {
+    /// A coat of GGX roughness `alpha` (0.1 is glossy, 0.4 satin) and index of refraction `ior`.
+    pub(crate) fn glazed(alpha: f32, ior: f32) -> Self {
+        Self::Glazed(Coat::new(alpha, ior))
+    }
 }
 
 impl Coat {

@@ -7,7 +7,7 @@
 
 use crate::accel::{Accel, Hit};
 use crate::light::{LightRig, LightSample};
-use crate::material::{Coat, Scatter, Surface, Vec3};
+use crate::material::{Finish, Scatter, Surface, Vec3};
 use crate::sampler::Sampler;
 use crate::scene::Paint;
 use geometry::Mesh;
@@ -18,7 +18,8 @@ pub(crate) struct World {
     accel: Accel,
     faces: Vec<Face>,
     paint: Paint,
-    coat: Option<Coat>,
+    /// By part; parts beyond the last are made of the last.
+    finishes: Vec<Finish>,
     /// How far a scattered ray starts off the surface: beyond the rounding of a hit point.
     offset: f32,
 }
@@ -59,8 +60,8 @@ struct Point<'a> {
 }
 
 impl World {
-    /// Takes over a mesh with its shading normals, its part per face and its look.
-    pub(crate) fn new(mesh: &Mesh, normals: &[[Vec3; 3]], parts: &[u8], paint: Paint, coat: Option<Coat>) -> Self {
+    /// Takes over a mesh with its shading normals, its part per face, its paint, and the finish of each part.
+    pub(crate) fn new(mesh: &Mesh, normals: &[[Vec3; 3]], parts: &[u8], paint: Paint, finishes: Vec<Finish>) -> Self {
         let diagonal = mesh.aabb().map_or(1.0, |b| b.diagonal()) as f32;
         let face = |f: usize| Face {
             corners: mesh.corners(f).map(|p| p.coords.cast()),
@@ -69,7 +70,7 @@ impl World {
             part: parts.get(f).copied().unwrap_or(0),
         };
         let faces = (0..mesh.faces.len()).map(face).collect();
-        Self { accel: Accel::new(mesh), faces, paint, coat, offset: 1e-5 * diagonal }
+        Self { accel: Accel::new(mesh), faces, paint, finishes, offset: 1e-5 * diagonal }
     }
 
     /// What a camera ray meets.
@@ -149,7 +150,12 @@ impl World {
         let frame = frame_around(normal);
         let wo = frame.map(|axis| -direction.dot(&axis)).into();
         let albedo = self.paint.albedo(position, normal, face.part);
-        let surface = Surface { albedo, coat: self.coat.as_ref() };
+        let finish = self.finishes.get(usize::from(face.part)).or(self.finishes.last());
+        let coat = match finish {
+            Some(Finish::Glazed(coat)) => Some(coat),
+            Some(Finish::Matt) | None => None,
+        };
+        let surface = Surface { albedo, coat };
         Some(Point { position, geometric: face.normal, frame, wo, surface })
     }
 }
@@ -197,8 +203,8 @@ mod tests {
 
     const LIMITS: PathLimits = PathLimits { surfaces: 4, clamp: f32::INFINITY };
 
-    fn world(mesh: &Mesh, albedo: f32, coat: Option<Coat>) -> World {
-        World::new(mesh, &corner_normals(mesh, 1.0), &[], Paint::Plain(Vec3::repeat(albedo)), coat)
+    fn world(mesh: &Mesh, albedo: f32, finish: Finish) -> World {
+        World::new(mesh, &corner_normals(mesh, 1.0), &[], Paint::Plain(Vec3::repeat(albedo)), vec![finish])
     }
 
     /// Mean and standard error over `n` pixels of one sample each along one ray.
@@ -225,9 +231,8 @@ mod tests {
     #[test]
     fn white_sphere_vanishes_in_a_white_furnace() {
         let rig = LightRig { sky: Sky::uniform(1.0), lights: vec![] };
-        for coat in [None, Some(Coat::new(0.15, 1.5))] {
-            let slack = if coat.is_some() { 2e-3 } else { 1e-6 };
-            let world = world(&sphere(1.0, 64), 1.0, coat);
+        for (finish, slack) in [(Finish::Matt, 1e-6), (Finish::glazed(0.15, 1.5), 2e-3)] {
+            let world = world(&sphere(1.0, 64), 1.0, finish);
             for x in [0.0, 0.5, 0.9] {
                 let (mean, error) = measure(&world, Vec3::new(x, 0.1, 5.0), -Vec3::z(), &rig, 40_000);
                 assert!((mean - 1.0).abs() < 3.0 * error + slack, "at {x}: {mean} ± {error}");
@@ -242,7 +247,7 @@ mod tests {
         let light = AreaLight::facing(LightShape::Disk, Vec3::new(0.0, 0.0, h), Vec3::zeros(), [r, r], Vec3::repeat(l));
         let rig = LightRig { sky: Sky::uniform(0.0), lights: vec![light] };
         let direction = Vec3::new(0.6, 0.0, -0.8);
-        let (mean, error) = measure(&world(&plane(), albedo, None), -direction, direction, &rig, 100_000);
+        let (mean, error) = measure(&world(&plane(), albedo, Finish::Matt), -direction, direction, &rig, 100_000);
         let expected = f64::from(albedo * l * r * r / (r * r + h * h));
         assert!((mean - expected).abs() < 3.0 * error, "{mean} ± {error} against {expected}");
     }
@@ -259,7 +264,8 @@ mod tests {
             radiance: Vec3::repeat(2.0),
         };
         let rig = LightRig { sky: Sky::uniform(0.0), lights: vec![light] };
-        let (mean, error) = measure(&world(&plane(), 1.0, None), Vec3::new(0.0, 0.0, 1.0), -Vec3::z(), &rig, 100_000);
+        let (mean, error) =
+            measure(&world(&plane(), 1.0, Finish::Matt), Vec3::new(0.0, 0.0, 1.0), -Vec3::z(), &rig, 100_000);
         let (x, y) = (a / h, b / h);
         let half = |x: f64, y: f64| x / (1.0 + x * x).sqrt() * (y / (1.0 + x * x).sqrt()).atan();
         let expected = 2.0 / 2.0 * (half(x, y) + half(y, x)) / PI;
@@ -272,7 +278,8 @@ mod tests {
             AreaLight::facing(LightShape::Disk, Vec3::new(0.0, 0.0, h), Vec3::zeros(), [1.0, 1.0], Vec3::repeat(l))
         };
         let rig = LightRig { sky: Sky::uniform(0.5), lights: vec![disk(3.0, 0.0), disk(2.0, 4.0)] };
-        let (mean, error) = measure(&world(&plane(), 0.5, None), Vec3::new(0.0, 0.0, 1.0), -Vec3::z(), &rig, 100_000);
+        let (mean, error) =
+            measure(&world(&plane(), 0.5, Finish::Matt), Vec3::new(0.0, 0.0, 1.0), -Vec3::z(), &rig, 100_000);
         // The disk covers r² / (r² + h²) = 1/5 of the projected hemisphere, and hides the sky there.
         let expected = 0.5 * (4.0 / 5.0 + 0.5 * 4.0 / 5.0);
         assert!((mean - expected).abs() < 3.0 * error + 1e-6, "{mean} ± {error} against {expected}");

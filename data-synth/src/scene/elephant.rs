@@ -3,13 +3,10 @@
 //! looks along +x, then scaled to the desk.
 
 use crate::isosurface::{Grid, extract};
-use crate::material::Vec3;
+use crate::material::{Finish, Vec3};
 use crate::shape::MeshBuilder;
 use crate::texture_field::{blend, color, fractal, noise, step, stripe, wrap};
 use nalgebra::{Point3, Vector3};
-
-/// GGX roughness of the glaze: highlights a few degrees wide, so that they move with the view.
-pub(crate) const GLAZE_ROUGHNESS: f32 = 0.13;
 
 const BODY: u8 = 0;
 const TUSK: u8 = 1;
@@ -37,6 +34,12 @@ pub(crate) fn build() -> MeshBuilder {
         *p = Point3::from(q.map(|c| f64::from(c as f32)));
     }
     b
+}
+
+/// What the parts are made of, in their order: one glaze over everything, rough enough for highlights a
+/// few degrees wide that move with the view.
+pub(crate) fn finishes() -> Vec<Finish> {
+    vec![Finish::glazed(0.13, 1.52)]
 }
 
 /// Distance to the whole figure; tusks grow out of the cheek in a soft collar.

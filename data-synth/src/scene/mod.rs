@@ -5,7 +5,7 @@ mod elephant;
 mod temple;
 
 use crate::error::SynthError;
-use crate::material::{Coat, Vec3};
+use crate::material::{Finish, Vec3};
 use crate::shape::MeshBuilder;
 use crate::trace::World;
 use geometry::Mesh;
@@ -75,12 +75,12 @@ impl Scene {
     /// Builds the object for tracing.
     pub(crate) fn build(self) -> Built {
         let MeshBuilder { mesh, parts, .. } = self.shape();
-        let (crease_deg, paint, coat) = match self {
-            Self::Temple => (32.0_f64, Paint::Temple, None),
-            Self::Elephant => (60.0, Paint::Elephant, Some(Coat::new(elephant::GLAZE_ROUGHNESS, 1.52))),
+        let (crease_deg, paint, finishes) = match self {
+            Self::Temple => (32.0_f64, Paint::Temple, vec![Finish::Matt]),
+            Self::Elephant => (60.0, Paint::Elephant, elephant::finishes()),
         };
         let normals = crate::shape::corner_normals(&mesh, crease_deg.to_radians());
-        let world = World::new(&mesh, &normals, &parts, paint, coat);
+        let world = World::new(&mesh, &normals, &parts, paint, finishes);
         Built { mesh, world }
     }
 }
