@@ -175,6 +175,7 @@ fn what_cannot_be_judged_is_refused_by_name() {
     let mut broken = good.clone();
     broken.positions[2].y = f64::NAN;
     assert!(message(&good, &broken, options).contains("vertex 2 is not finite"));
+    assert!(message(&good, &sphere(1e90, 1), options).contains("true mesh are too far apart"));
     for (name, bad) in [
         ("accuracy_pct", AccuracyOptions { accuracy_pct: 0.0, ..options }),
         ("accuracy_pct", AccuracyOptions { accuracy_pct: f64::NAN, ..options }),

@@ -16,6 +16,7 @@ mod nearest;
 mod sample;
 
 use crate::{GeometryError, Mesh};
+use nalgebra::Point3;
 use nearest::{Nearest, Surface};
 use rayon::prelude::*;
 use sample::sample_surface;
@@ -47,7 +48,7 @@ pub struct Accuracy {
     /// Share of the truth within [`AccuracyOptions::tolerance`] of the mesh, in %.
     pub completeness_pct: f64,
     /// The largest distance either way (Hausdorff), over all samples and vertices: never more than the true
-    /// one, and short of it by less than the spacing of the samples.
+    /// one, and short of it by about the spacing of the samples at most.
     pub hausdorff: f64,
     /// Distances of points of the mesh from the truth.
     pub from_mesh: Deviation,
@@ -124,6 +125,11 @@ fn check_options(options: &AccuracyOptions) -> Result<(), GeometryError> {
 
 fn surface(mesh: &Mesh, name: &str) -> Result<Surface, GeometryError> {
     mesh.check_input()?;
+    // Squares of areas must be numbers.
+    if mesh.aabb().is_some_and(|aabb| !aabb.diagonal().powi(4).is_finite()) {
+        let fault = format!("coordinates of the {name} are too far apart to compute with");
+        return Err(GeometryError::Mesh { fault, remedy: "scale it to a sensible unit" });
+    }
     let nothing = || {
         let fault = format!("the {name} has no face with an area");
         GeometryError::degenerate(fault, "check that the mesh is the one meant")
@@ -146,7 +152,7 @@ impl Distances {
         let mut sampled: Vec<Nearest> = points.par_iter().map(|p| to.nearest(p)).collect();
         sampled.retain(is_judged);
         // Spikes end at vertices.
-        let vertices = from.faces.par_iter().flatten_iter().map(|&v| to.nearest(&from.positions[v as usize]));
+        let vertices = used_vertices(from).into_par_iter().map(|p| to.nearest(&p));
         let at_vertices = vertices.filter(is_judged).map(|n| n.distance).reduce(|| 0.0, f64::max);
         let max = sampled.iter().map(|n| n.distance).fold(at_vertices, f64::max);
         Self { sampled, samples: points.len(), max }
@@ -169,4 +175,11 @@ impl Distances {
         let rank = ((share * self.sampled.len() as f64).ceil() as usize).clamp(1, self.sampled.len());
         self.sampled.select_nth_unstable_by(rank - 1, |a, b| a.distance.total_cmp(&b.distance)).1.distance
     }
+}
+
+/// The vertices that some face has, each once.
+fn used_vertices(mesh: &Mesh) -> Vec<Point3<f64>> {
+    let mut is_used = vec![false; mesh.positions.len()];
+    mesh.faces.as_flattened().iter().for_each(|&v| is_used[v as usize] = true);
+    mesh.positions.iter().zip(is_used).filter_map(|(p, used)| used.then_some(*p)).collect()
 }
