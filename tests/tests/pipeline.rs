@@ -80,6 +80,7 @@ fn compare(
         load: LoadOptions::default(),
         shape: ShapeOptions::default(),
         fit: FitOptions::default(),
+        truth: None,
     };
     evaluate::compare(capture, "small", &options, report, &mut Stages::new(&Silent))
 }
