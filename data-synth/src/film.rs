@@ -279,8 +279,7 @@ impl Shot<'_> {
             rays += 1;
             let Some(hit) = exposure.world.first_hit(sight.origin, sight.direction) else { continue };
             let traced = exposure.world.radiance(hit, sight.direction, exposure.rig, &exposure.limits, &mut sampler);
-            // The low bits of the sample number choose the stratum: every fourth would be a part of the
-            // pixel, not a picture of it.
+            // Samples in a row, a net of their own.
             let batch = (i * BATCHES / samples) as usize;
             batches[batch] += traced.radiance;
             met[batch] += 1;
