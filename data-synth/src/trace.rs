@@ -9,7 +9,7 @@
 use crate::accel::{Accel, Hit};
 use crate::light::{LightRig, LightSample};
 use crate::material::{Coat, Finish, Lobes, Surface, Vec3, frame_around, fresnel_dielectric, reflect};
-use crate::medium::Medium;
+use crate::medium::{Medium, Profile};
 use crate::sampler::Sampler;
 use crate::scene::Paint;
 use geometry::Mesh;
@@ -18,6 +18,8 @@ use geometry::Mesh;
 const MAX_PASSAGES: usize = 64;
 /// Crossings of a probe through a translucent body that are considered.
 const MAX_CROSSINGS: usize = 16;
+/// Odds of probing along the tangents and the normal: on a flat part only the normal finds anything.
+const AXIS_ODDS: [f32; 3] = [0.1, 0.1, 0.8];
 /// Most a path is likely to survive a surface by roulette.
 const SURVIVAL: f32 = 0.95;
 
@@ -156,6 +158,20 @@ impl World {
         Point { position: face.position(hit.barycentric), geometric, frame, wo, surface }
     }
 
+    /// What light that enters at a crossing gives at a point, over the density with which probes find it.
+    fn crossing_weight(&self, point: &Point<'_>, crossing: Hit, profile: &Profile) -> Vec3 {
+        let face = &self.faces[crossing.face as usize];
+        let offset = point.to_local(face.position(crossing.barycentric) - point.position);
+        let normal = point.to_local(face.normal);
+        let found = |k: usize| {
+            let aside = offset[(k + 1) % 3].hypot(offset[(k + 2) % 3]);
+            AXIS_ODDS[k] * profile.pdf(aside) * normal[k].abs()
+        };
+        let pdf: f32 = (0..3).map(found).sum();
+        let is_near = offset.norm() < profile.reach() && pdf > 0.0;
+        if is_near { profile.density(offset.norm()) / pdf } else { Vec3::zeros() }
+    }
+
     /// The surface at a crossing, seen from straight outside.
     fn outside<'a>(&self, hit: Hit, surface: Surface<'a>) -> Point<'a> {
         let face = &self.faces[hit.face as usize];
@@ -276,40 +292,36 @@ impl<'a> Path<'a> {
     }
 
     /// A point where light that comes out at `point` may have entered, with its weight: along a line beside
-    /// the normal or one of the tangents, at a distance drawn from the profile, one of all crossings.
+    /// the normal or one of the tangents, at a distance drawn from the profile; of all crossings one, by what
+    /// it gives (resampled importance sampling, Talbot, Cline, Egbert, EGSR 2005).
     fn probe<'b>(&mut self, point: &Point<'b>, paint: Vec3, medium: Medium, lobes: Lobes) -> Option<(Point<'b>, Vec3)> {
         let (profile, world) = (medium.profile(paint), self.world);
         let ([axis, angle], radius, [pick, _]) = (self.sampler.pair(), self.sampler.pair(), self.sampler.pair());
         let radius = profile.sample(radius)?;
-        // The normal half of the time, each tangent a quarter; axes as (x, y, z) of the frame.
-        let along = if axis < 0.5 { 2 } else { usize::from(axis >= 0.75) };
+        let [first, second, _] = AXIS_ODDS;
+        let along = usize::from(axis >= first) + usize::from(axis >= first + second);
         let [t, b, n] = [1, 2, 0].map(|k| point.frame[(along + k) % 3]);
         let (sin, cos) = (std::f32::consts::TAU * angle).sin_cos();
         let half = (profile.reach().powi(2) - radius * radius).max(0.0).sqrt();
         let mut origin = point.position + (t * cos + b * sin) * radius + n * half;
-        let (mut left, mut crossings, mut count) = (2.0 * half, [None; MAX_CROSSINGS], 0);
-        while count < MAX_CROSSINGS {
+        let mut left = 2.0 * half;
+        let (mut crossings, mut total) = ([None; MAX_CROSSINGS], 0.0);
+        for slot in &mut crossings {
             self.traced.rays += 1;
             let Some(crossing) = world.accel.nearest(origin, -n, left) else { break };
             let step = crossing.distance + world.offset;
             (origin, left) = (origin - n * step, left - step);
-            crossings[count] = Some(crossing);
-            count += 1;
+            let weight = world.crossing_weight(point, crossing, &profile);
+            total += weight.sum();
+            *slot = Some((crossing, weight));
         }
-        let crossing = crossings[((pick * count as f32) as usize).min(count.saturating_sub(1))]?;
+        let mut left = pick * total;
+        let (crossing, weight) = crossings.into_iter().flatten().find(|(_, weight)| {
+            left -= weight.sum();
+            left < 0.0
+        })?;
         let surface = Surface { albedo: paint, coat: point.surface.coat, lobes };
-        let out = world.outside(crossing, surface);
-        let offset = point.to_local(out.position - point.position);
-        let normal = point.to_local(out.geometric);
-        let pdf: f32 = [(0, 0.25), (1, 0.25), (2, 0.5)]
-            .map(|(k, odds)| {
-                let aside = offset[(k + 1) % 3].hypot(offset[(k + 2) % 3]);
-                odds * profile.pdf(aside) * normal[k].abs()
-            })
-            .into_iter()
-            .sum();
-        let weight = profile.density(offset.norm()) * (count as f32 / pdf);
-        (offset.norm() < profile.reach() && pdf > 0.0).then_some((out, weight))
+        Some((world.outside(crossing, surface), weight * (total / weight.sum())))
     }
 
     /// Russian roulette by the throughput.
