@@ -4,6 +4,7 @@
 //! and nowhere else.
 
 mod detect;
+mod orientation;
 mod read;
 mod write;
 

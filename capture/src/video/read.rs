@@ -1,5 +1,6 @@
 //! Reads films frame by frame.
 
+use super::orientation::quarter_turns;
 use super::{failed, rgb_of};
 use crate::load::reduced;
 use crate::{CaptureError, Image};
@@ -52,6 +53,7 @@ pub struct FilmReader {
     film: VideoCapture,
     info: FilmInfo,
     downscale: usize,
+    quarter_turns: u8,
     frame: Mat,
     read: usize,
     last_time_s: f64,
@@ -60,7 +62,8 @@ pub struct FilmReader {
 
 impl FilmReader {
     /// Opens a film of any kind FFmpeg reads. The first frame is decoded, so that what is no film is refused here.
-    /// Phones note how they were held; frames come out upright.
+    /// Phones note how they were held: frames of .mp4 and
+    /// .mov come out upright.
     ///
     /// # Errors
     /// [`CaptureError::Io`] where there is no such file, [`CaptureError::Invalid`] where it is empty, no film, cut
@@ -74,7 +77,7 @@ impl FilmReader {
                 "give a film, or a folder of photographs to `import`",
             ));
         }
-        let film = VideoCapture::from_file(path, videoio::CAP_FFMPEG).map_err(|e| failed(path, &e))?;
+        let mut film = VideoCapture::from_file(path, videoio::CAP_FFMPEG).map_err(|e| failed(path, &e))?;
         if !film.is_opened().map_err(|e| failed(path, &e))? {
             return Err(CaptureError::invalid(
                 path,
@@ -82,6 +85,8 @@ impl FilmReader {
                 "copy it again from its source, or convert it to .mp4",
             ));
         }
+        // Refused where OpenCV knows no orientation, and then does nothing about it.
+        let _ = film.set(videoio::CAP_PROP_ORIENTATION_AUTO, 0.0).map_err(|e| failed(path, &e))?;
         let get = |property: i32| film.get(property).ok().filter(|v| v.is_finite() && *v > 0.0).unwrap_or(0.0);
         let frames = get(videoio::CAP_PROP_FRAME_COUNT) as usize;
         let fps = get(videoio::CAP_PROP_FPS);
@@ -92,6 +97,7 @@ impl FilmReader {
             film,
             info,
             downscale: options.downscale,
+            quarter_turns: quarter_turns(path),
             frame,
             read: 0,
             last_time_s: f64::NEG_INFINITY,
@@ -112,7 +118,7 @@ impl FilmReader {
             let remedy = "copy it again from its source, or film again";
             return Err(CaptureError::invalid(&self.path, "is a film without a frame that can be decoded", remedy));
         }
-        let image = rgb_of(&self.frame).map_err(|e| failed(&self.path, &e))?;
+        let image = self.upright()?;
         let downscale = self.downscale;
         if downscale == 0 || image.width() / downscale == 0 || image.height() / downscale == 0 {
             return Err(CaptureError::Downscale { path: self.path.clone(), downscale });
@@ -127,10 +133,21 @@ impl FilmReader {
         self.film.read(&mut self.frame).map_err(|e| failed(&self.path, &e))
     }
 
+    /// The frame decoded last, turned as the camera was not.
+    fn upright(&self) -> Result<Image<[u8; 3]>, CaptureError> {
+        let image = rgb_of(&self.frame).map_err(|e| failed(&self.path, &e))?;
+        let (w, h) = (image.width(), image.height());
+        Ok(match self.quarter_turns {
+            1 => rearranged(h, w, |x, y| image.at(y, h - 1 - x)),
+            2 => rearranged(w, h, |x, y| image.at(w - 1 - x, h - 1 - y)),
+            3 => rearranged(h, w, |x, y| image.at(w - 1 - y, x)),
+            _ => image,
+        })
+    }
+
     /// Hands out the frame decoded last and decodes the one after it.
     fn take(&mut self) -> Result<FilmFrame, CaptureError> {
-        let image = rgb_of(&self.frame).map_err(|e| failed(&self.path, &e))?;
-        let image = reduced(&image, self.downscale);
+        let image = reduced(&self.upright()?, self.downscale);
         if (image.width(), image.height()) != (self.info.width, self.info.height) {
             let fault = format!("frame {} is of another size than the first one", self.read);
             return Err(CaptureError::invalid(&self.path, fault, "cut the film where its size changes"));
@@ -172,6 +189,14 @@ impl Iterator for FilmReader {
         }
         Some(frame)
     }
+}
+
+fn rearranged(width: usize, height: usize, pixel: impl Fn(usize, usize) -> [u8; 3]) -> Image<[u8; 3]> {
+    let mut image = Image::filled(width, height, [0; 3]);
+    for (place, value) in image.pixels_mut().iter_mut().enumerate() {
+        *value = pixel(place % width, place / width);
+    }
+    image
 }
 
 /// Why FFmpeg would not open a file that is there.

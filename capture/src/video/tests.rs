@@ -111,28 +111,36 @@ fn find_box(bytes: &[u8], names: &[&[u8; 4]]) -> usize {
 
 #[test]
 fn a_film_taken_upright_comes_out_upright() {
+    let one = 1 << 16;
+    let [width, height] = SIZE;
+    // As phones write it. Where the film's pixel (x, y) is on the screen, from the matrix by hand.
+    type Place = fn(usize, usize) -> [usize; 2];
+    let held: [([i32; 4], Place); 3] = [
+        ([0, one, -one, 0], |x, y| [SIZE[1] - 1 - y, x]),
+        ([-one, 0, 0, -one], |x, y| [SIZE[0] - 1 - x, SIZE[1] - 1 - y]),
+        ([0, -one, one, 0], |x, y| [y, SIZE[0] - 1 - x]),
+    ];
     let (_folder, path) = place("film.mp4");
     write(&path, 30.0);
-    let mut bytes = fs::read(&path).unwrap();
-    // ISO 14496-12: the matrix is nine numbers 40 bytes into the body of version 0, [a b u c d v x y w].
-    let matrix = find_box(&bytes, &[b"moov", b"trak", b"tkhd"]) + 8 + 40;
-    let mut set = |position: usize, value: i32| {
-        bytes[matrix + 4 * position..][..4].copy_from_slice(&value.to_be_bytes());
-    };
-    // A quarter turn clockwise, as phones write it.
-    [(0, 0), (1, 1 << 16), (3, -1 << 16), (4, 0), (6, (SIZE[1] as i32) << 16)].map(|(at, value)| set(at, value));
-    fs::write(&path, bytes).unwrap();
-    let frames = read(&path).unwrap();
-    assert_eq!((frames[0].image.width(), frames[0].image.height()), (SIZE[1], SIZE[0]));
-    for frame in &frames {
-        let upright = &frame.image;
-        let mut turned_back = Image::filled(SIZE[0], SIZE[1], [0; 3]);
-        for y in 0..SIZE[1] {
-            for x in 0..SIZE[0] {
-                turned_back.set(x, y, upright.at(SIZE[1] - 1 - y, x));
-            }
+    for ([a, b, c, d], place) in held {
+        let mut bytes = fs::read(&path).unwrap();
+        // The matrix is nine numbers 40 bytes into the body of version 0: [a b u c d v x y w].
+        let matrix = find_box(&bytes, &[b"moov", b"trak", b"tkhd"]) + 8 + 40;
+        for (position, value) in [(0, a), (1, b), (3, c), (4, d)] {
+            bytes[matrix + 4 * position..][..4].copy_from_slice(&value.to_be_bytes());
         }
-        assert_eq!(number(&turned_back), frame.index);
+        fs::write(&path, bytes).unwrap();
+        for frame in read(&path).unwrap() {
+            let mut as_coded = Image::filled(width, height, [0; 3]);
+            for y in 0..height {
+                for x in 0..width {
+                    let [u, v] = place(x, y);
+                    as_coded.set(x, y, frame.image.at(u, v));
+                }
+            }
+            assert_eq!(number(&as_coded), frame.index);
+            assert!(psnr(&as_coded, &counted(frame.index)) > 34.0);
+        }
     }
 }
 
@@ -149,6 +157,10 @@ fn timestamps_follow_a_rate_that_varies() {
     let duration = number(&bytes, table + 20);
     let runs: Vec<u8> = [2, 15, duration, 15, 2 * duration].iter().flat_map(|v: &u32| v.to_be_bytes()).collect();
     bytes.splice(table + 12..table + 24, runs);
+    // The edit list shows the track from a place on and so long: one and a half times as long now.
+    let edits = find_box(&bytes, &[b"moov", b"trak", b"edts", b"elst"]);
+    let shown = number(&bytes, edits + 16) * 3 / 2;
+    bytes[edits + 16..edits + 20].copy_from_slice(&shown.to_be_bytes());
     for depth in 1..=names.len() {
         let at = find_box(&bytes, &names[..depth]);
         let size = number(&bytes, at) + 8;
