@@ -193,7 +193,7 @@ impl Board {
         match *self {
             Self::Chessboard { columns, rows, square } | Self::Charuco { columns, rows, square, .. } => {
                 let places = (1..rows).flat_map(|row| (1..columns).map(move |column| [column, row]));
-                places.map(|place| self.from_sheet(place.map(|n| n as f64 * square))).collect()
+                places.map(|place| self.on_board(place.map(|n| n as f64 * square))).collect()
             }
             Self::ArucoGrid { .. } => self.markers().iter().flat_map(|marker| marker.corners).collect(),
         }
@@ -203,7 +203,7 @@ impl Board {
     pub fn markers(&self) -> Vec<Marker> {
         let marker = |(id, ([x, y], side)): (usize, ([f64; 2], f64))| {
             let corners = [[x, y], [x + side, y], [x + side, y + side], [x, y + side]];
-            Marker { id, corners: corners.map(|corner| self.from_sheet(corner)) }
+            Marker { id, corners: corners.map(|corner| self.on_board(corner)) }
         };
         self.marker_places().into_iter().enumerate().map(marker).collect()
     }
@@ -264,7 +264,7 @@ impl Board {
         Ok(dark.map(|coverage| (255.0 * (1.0 - coverage.min(1.0))).round() as u8))
     }
 
-    fn from_sheet(&self, [x, y]: [f64; 2]) -> Point3<f64> {
+    fn on_board(&self, [x, y]: [f64; 2]) -> Point3<f64> {
         Point3::new(x, self.size()[1] - y, 0.0)
     }
 
