@@ -15,7 +15,7 @@ fn data(name: &str) -> Option<PathBuf> {
     None
 }
 
-/// The pictures of a folder whose names start so, in order.
+/// The pictures of a folder whose names start so, in order, every third of them.
 fn pictures(folder: &Path, start: &str) -> Vec<Image<[u8; 3]>> {
     let entries = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
     let is_wanted = |path: &PathBuf| {
@@ -24,7 +24,7 @@ fn pictures(folder: &Path, start: &str) -> Vec<Image<[u8; 3]>> {
     };
     let mut paths: Vec<PathBuf> = entries.filter(is_wanted).collect();
     paths.sort();
-    paths.iter().map(|path| capture::read_rgb(path).unwrap()).collect()
+    paths.iter().step_by(3).map(|path| capture::read_rgb(path).unwrap()).collect()
 }
 
 #[test]
@@ -45,7 +45,7 @@ fn photographed_chessboards_are_found() {
     let images = pictures(&folder, "left");
     let counts: Vec<usize> = images.iter().map(|image| detect_board(image, &board).unwrap().corners.len()).collect();
     println!("{counts:?} corners");
-    assert!(counts.iter().filter(|&&count| count >= 50).count() >= images.len() - 2, "{counts:?}");
+    assert!(counts.iter().filter(|&&count| count >= 50).count() >= images.len() - 1, "{counts:?}");
 }
 
 #[test]
@@ -60,7 +60,7 @@ fn a_chessboard_is_found_through_a_real_film() {
         let frame = frame.unwrap();
         assert_eq!(frame.index, frames);
         frames += 1;
-        if frame.index % 15 == 0 {
+        if frame.index % 30 == 0 {
             counts.push(detect_board(&frame.image, &board).unwrap().corners.len());
         }
     }

@@ -68,7 +68,7 @@ const fn dictionary(name: &'static str, modules: usize, len: usize, family: Fami
     Dictionary { name, modules, len, family }
 }
 
-/// Every dictionary, in OpenCV's numbering but for the AprilTags, which it numbers 20.
+/// Every dictionary, in OpenCV's numbering but for the AprilTags.
 const ALL: [Dictionary; 18] = [
     dictionary("4x4_50", 4, 50, F4),
     dictionary("4x4_100", 4, 100, F4),

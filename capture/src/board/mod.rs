@@ -269,7 +269,7 @@ impl Board {
     }
 
     /// From one square or marker to the next.
-    fn pitch(&self) -> f64 {
+    pub(crate) fn pitch(&self) -> f64 {
         match *self {
             Self::Chessboard { square, .. } | Self::Charuco { square, .. } => square,
             Self::ArucoGrid { marker, gap, .. } => marker + gap,

@@ -139,7 +139,7 @@ impl Sheet {
         let line = |(i, line): (usize, &String)| {
             let [x, y] = [self.baseline[0], self.baseline[1] + 1.3 * TEXT * i as f64].map(millimetres);
             format!(
-                "<text x=\"{x}\" y=\"{y}\" font-size=\"{text}\" font-family=\"Helvetica, Arial, sans-serif\">{line}</text>\n"
+                "<text x=\"{x}\" y=\"{y}\" font-size=\"{text}\" font-family=\"Helvetica, sans-serif\">{line}</text>\n"
             )
         };
         let caption: String = self.caption.iter().enumerate().map(line).collect();

@@ -111,9 +111,11 @@ fn from_opencv(p: Point2f) -> Point2<f64> {
 
 /// OpenCV's own copy of a dictionary.
 fn opencv_dictionary(dictionary: Dictionary) -> opencv::Result<Ptr<aruco::Dictionary>> {
+    if dictionary.name() == "apriltag_36h11" {
+        return aruco::get_predefined_dictionary(aruco::PREDEFINED_DICTIONARY_NAME::DICT_APRILTAG_36h11);
+    }
     let position = Dictionary::all().iter().position(|known| *known == dictionary).unwrap_or_default();
-    // The AprilTags 36h11 are its number 20, after three families unknown here.
-    aruco::get_predefined_dictionary_i32(if position == 17 { 20 } else { position as i32 })
+    aruco::get_predefined_dictionary_i32(position as i32)
 }
 
 fn markers_in(
@@ -218,7 +220,50 @@ fn charuco(grey: &Image<u8>, board: &Board, markers: Vec<FoundMarker>) -> opencv
         let free = 0.5 * (square - marker);
         corners.extend(refined(grey, board, corner, &map, free).map(|pixel| (id, pixel)));
     }
-    Ok(BoardView { corners, markers })
+    Ok(BoardView { corners: grown(grey, board, corners, 0.5 * (square - marker))?, markers })
+}
+
+/// Goes on from corners found to their neighbours: corners are still seen where markers are too small or too blurred to
+/// be read. Each is predicted from those around it, so that again no lens model is needed.
+fn grown(
+    grey: &Image<u8>,
+    board: &Board,
+    mut found: Vec<(usize, Point2<f64>)>,
+    free: f64,
+) -> opencv::Result<Vec<(usize, Point2<f64>)>> {
+    let places = board.corners();
+    let square = board.pitch();
+    let mut is_open: Vec<bool> = (0..places.len()).map(|id| found.iter().all(|(known, _)| *known != id)).collect();
+    loop {
+        let known = found.len();
+        for (id, place) in places.iter().enumerate().filter(|(id, _)| is_open[*id]) {
+            let around: Vec<_> = found[..known]
+                .iter()
+                .map(|(other, pixel)| (places[*other].xy(), *pixel))
+                .filter(|(other, _)| (other - place.xy()).norm() < 3.0 * square)
+                .collect();
+            let is_next = around.iter().any(|(other, _)| (other - place.xy()).norm() < 1.1 * square);
+            if !is_next || !spans_a_plane(&around, square) {
+                continue;
+            }
+            let Some(map) = homography(&around, 0, 0.0)? else { continue };
+            found.extend(refined(grey, board, place, &map, free).map(|pixel| (id, pixel)));
+        }
+        if found.len() == known {
+            found.sort_by_key(|(id, _)| *id);
+            return Ok(found);
+        }
+        found[known..].iter().for_each(|(id, _)| is_open[*id] = false);
+    }
+}
+
+/// Whether four of the points are corners of a quadrilateral: a homography needs no less.
+fn spans_a_plane(points: &[(Point2<f64>, Point2<f64>)], square: f64) -> bool {
+    let places: Vec<[i64; 2]> = points.iter().map(|(p, _)| [p.x, p.y].map(|v| (v / square).round() as i64)).collect();
+    let two_of = |row: i64| places.iter().filter(|place| place[1] == row).count() >= 2;
+    let rows: std::collections::BTreeSet<i64> =
+        places.iter().map(|place| place[1]).filter(|&row| two_of(row)).collect();
+    rows.len() >= 2
 }
 
 /// A corner where four squares meet, near where `map` (board to pixels) puts it; `None` where the image shows none

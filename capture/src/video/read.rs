@@ -31,7 +31,7 @@ pub struct FilmInfo {
     pub height: usize,
     /// Frames promised; 0 where the film does not say. Some kinds of film only estimate it.
     pub frames: usize,
-    /// Frames per second, on average.
+    /// Frames per second, on average; 25 where the film does not say.
     pub fps: f64,
 }
 
@@ -62,8 +62,7 @@ pub struct FilmReader {
 
 impl FilmReader {
     /// Opens a film of any kind FFmpeg reads. The first frame is decoded, so that what is no film is refused here.
-    /// Phones note how they were held: frames of .mp4 and
-    /// .mov come out upright.
+    /// Phones note how they were held: frames of .mp4 and .mov come out upright.
     ///
     /// # Errors
     /// [`CaptureError::Io`] where there is no such file, [`CaptureError::Invalid`] where it is empty, no film, cut
@@ -90,7 +89,8 @@ impl FilmReader {
         let get = |property: i32| film.get(property).ok().filter(|v| v.is_finite() && *v > 0.0).unwrap_or(0.0);
         let frames = get(videoio::CAP_PROP_FRAME_COUNT) as usize;
         let fps = get(videoio::CAP_PROP_FPS);
-        let info = FilmInfo { width: 0, height: 0, frames, fps: if fps > 0.0 { fps } else { 25.0 } };
+        let fps = if fps > 0.0 { fps } else { 25.0 };
+        let info = FilmInfo { width: 0, height: 0, frames, fps };
         let frame = Mat::default();
         let mut reader = Self {
             path: path.to_owned(),
@@ -100,7 +100,7 @@ impl FilmReader {
             quarter_turns: quarter_turns(path),
             frame,
             read: 0,
-            last_time_s: f64::NEG_INFINITY,
+            last_time_s: -1.0 / fps,
             is_over: false,
         };
         reader.open_first()?;

@@ -144,6 +144,18 @@ fn what_hides_the_board_moves_no_corner() {
 }
 
 #[test]
+fn corners_are_found_where_markers_are_too_small_to_be_read() {
+    let board = charuco();
+    // Two metres away a module is a pixel and a half.
+    let camera = camera(0.5, 0.4, 2.0);
+    let view = detect_board(&noisy(&photograph(&board, &camera), 2.0), &board).unwrap();
+    let (mean, rms) = errors(&view, &board, &camera);
+    println!("{} markers, {} corners, mean {mean:.4?}, rms {rms:.4}", view.markers.len(), view.corners.len());
+    assert!(view.markers.len() < 12 && view.corners.len() == 24);
+    assert!(mean.iter().all(|m| m.abs() < 0.02) && rms < 0.03, "{mean:?} {rms}");
+}
+
+#[test]
 fn nothing_is_found_where_nothing_is() {
     for (width, height) in [(0, 0), (3, 3), (320, 240)] {
         let image = Image::filled(width, height, [127; 3]);
