@@ -377,3 +377,21 @@ fn boards_are_drawn_to_the_scale_they_say() {
     }
     assert_eq!(listing(place.path()), before);
 }
+
+#[test]
+fn films_are_written_where_the_build_can() {
+    let place = tempfile::tempdir().expect("a folder");
+    let args = ["synth", "elephant", "-o", "capture", "--views", "4", "--size", "64x48", "--quiet", "--video"];
+    let run = turnlight(place.path(), &[&args[..], &["film.gif"]].concat());
+    assert_eq!(run.code, Some(2), "{}", run.stderr);
+    assert!(run.stderr.contains(".apng") && listing(place.path()).is_empty(), "{}", run.stderr);
+    let run = turnlight(place.path(), &[&args[..], &["film.mp4"]].concat());
+    if cfg!(feature = "video") {
+        assert_eq!((run.code, run.stderr.as_str()), (Some(0), ""));
+        assert!(fs::read(place.path().join("film.mp4")).expect("a film")[4..].starts_with(b"ftyp"));
+    } else {
+        assert_eq!(run.code, Some(2), "{}", run.stderr);
+        assert!(run.stderr.contains("--features video"), "{}", run.stderr);
+        assert!(listing(place.path()).is_empty());
+    }
+}

@@ -7,9 +7,9 @@ use turnlight::capture::board::{Dictionary, Paper, parse_length};
 
 /// What this build can and cannot do.
 const FILMS: &str = if cfg!(feature = "video") {
-    "Built with films, through OpenCV."
+    "Built with films (.mp4 .mov .avi .mkv), through OpenCV."
 } else {
-    "Built without films: to read and write them, install libopencv-dev, clang and libclang-dev and build with \
+    "Built without films (.mp4 .mov .avi .mkv): to read and write them, install libopencv-dev, clang and libclang-dev and build with \
      --features video."
 };
 
@@ -274,7 +274,7 @@ pub(crate) struct RenderArgs {
     /// Where the pictures go, one PNG per camera
     #[arg(short, long, value_name = "DIR", required_unless_present = "video")]
     pub(crate) output: Option<PathBuf>,
-    /// Write a film (.png .apng: an animated PNG)
+    /// Write a film (.png .apng: animated; .mp4 .mov .avi .mkv where built with films)
     #[arg(long, value_name = "FILE")]
     pub(crate) video: Option<PathBuf>,
     /// Frames per second of the film
@@ -307,7 +307,7 @@ pub(crate) struct SynthArgs {
     /// Seed of everything random
     #[arg(long, default_value = "1")]
     pub(crate) seed: u64,
-    /// Write the frames as a film too (.png .apng: an animated PNG)
+    /// Write the frames as a film too (.png .apng: animated; .mp4 .mov .avi .mkv where built with films)
     #[arg(long, value_name = "FILE")]
     pub(crate) video: Option<PathBuf>,
 }
