@@ -331,15 +331,17 @@ impl Shot<'_> {
     }
 }
 
-/// Standard error of a pixel in levels of 255, root mean square over channels, from parts of its samples;
-/// errs high, for a part is stratified less finely than the whole. `None` with fewer than two parts.
+/// Standard error of a pixel in levels of 255, root mean square over channels, from parts of its samples, and
+/// from what finer stratification takes off the whole ([`GAIN`]); rather high than low. `None` with fewer
+/// than two parts.
 fn standard_error(batches: &[Vec3], met: &[u32], share: f32) -> Option<f32> {
     let level = |(b, &m): (&Vec3, &u32)| (m > 0).then(|| (b * (share / m as f32)).map(encode));
     let levels: Vec<Vec3> = batches.iter().zip(met).filter_map(level).collect();
     let n = levels.len() as f32;
     let mean = levels.iter().sum::<Vec3>() / n.max(1.0);
     let squares = levels.iter().map(|l| (l - mean).norm_squared()).sum::<f32>();
-    (levels.len() > 1).then(|| (squares / (3.0 * n * (n - 1.0))).sqrt())
+    let finer = n.powf(1.0 - GAIN as f32);
+    (levels.len() > 1).then(|| (squares / (3.0 * n * (n - 1.0)) * finer).sqrt())
 }
 
 /// Linear radiance to the sRGB scale 0..=255 (IEC 61966-2-1).
