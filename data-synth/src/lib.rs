@@ -12,6 +12,7 @@
 //! [`SynthOptions::surfaces`] surfaces, so deep cavities are slightly dark.
 
 mod accel;
+pub mod btf;
 mod error;
 mod film;
 mod isosurface;
