@@ -16,7 +16,7 @@ pub(crate) struct Patch {
     pub(crate) normals: Vec<Vec3>,
     /// Reflectance at each vertex, linear RGB.
     pub(crate) colors: Vec<Vec3>,
-    /// What all of it is made of.
+    /// What all of it is made of; not of glass, and what is translucent is taken for glazed.
     pub(crate) finish: Finish,
 }
 

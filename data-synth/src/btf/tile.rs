@@ -7,7 +7,7 @@
 
 use super::patch::Patch;
 use crate::accel::{Accel, Hit};
-use crate::material::{Finish, Surface, Vec3};
+use crate::material::{Finish, Lobes, Surface, Vec3};
 use geometry::Mesh;
 use nalgebra::Vector3;
 
@@ -134,11 +134,7 @@ impl Tile {
         let smooth = mixed(&face.normals).try_normalize(1e-6).filter(|n| n.dot(&direction) < 0.0);
         let frame = frame_around(smooth.unwrap_or(face.normal));
         let wo = frame.map(|axis| -direction.dot(&axis)).into();
-        let coat = match &self.finish {
-            Finish::Glazed(coat) => Some(coat),
-            Finish::Matt => None,
-        };
-        let surface = Surface { albedo: mixed(&face.colors), coat };
+        let surface = Surface { albedo: mixed(&face.colors), coat: self.finish.coat(), lobes: Lobes::All };
         Some(Point { position, geometric: face.normal, frame, wo, surface })
     }
 }

@@ -16,7 +16,7 @@ const PLATES: [i64; 2] = [6, 2];
 pub(super) fn patch(seed: u64) -> Patch {
     let mut patch = Patch::new(SIDE_MM, Finish::Matt);
     let (crest, flank, gap) = (color([150, 134, 116]), color([104, 80, 60]), color([44, 28, 20]));
-    let lichen = color([142, 152, 112]);
+    let lichen = color([132, 136, 112]);
     patch.relief(
         CELLS,
         |x, y| height(seed, x, y),

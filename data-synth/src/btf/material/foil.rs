@@ -8,14 +8,13 @@ use crate::material::{Finish, Vec3};
 /// Length of the period.
 pub(super) const SIDE_MM: f64 = 60.0;
 const CELLS: usize = 320;
-/// A dielectric of this index reflects nine tenths of the light at normal incidence, and little more
-/// towards grazing, over a base that keeps the rest: aluminium, without its faint blue.
-const INDEX: f32 = 38.0;
+/// Reflectance of aluminium at normal incidence, linear RGB.
+const ALUMINIUM: [f32; 3] = [0.91, 0.92, 0.92];
 
 /// The sheet.
 pub(super) fn patch(seed: u64) -> Patch {
-    let mut patch = Patch::new(SIDE_MM, Finish::glazed(0.16, INDEX));
-    patch.relief(CELLS, |x, y| height(seed, x, y), |_| Vec3::zeros());
+    let mut patch = Patch::new(SIDE_MM, Finish::metal(0.18));
+    patch.relief(CELLS, |x, y| height(seed, x, y), |_| Vec3::from(ALUMINIUM));
     patch
 }
 

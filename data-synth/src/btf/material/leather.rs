@@ -10,7 +10,7 @@ use std::f64::consts::FRAC_PI_2;
 pub(super) const SIDE_MM: f64 = 12.0;
 const CELLS: usize = 320;
 /// Pebbles along the period.
-const PEBBLES: i64 = 9;
+const PEBBLES: i64 = 13;
 
 /// The hide.
 pub(super) fn patch(seed: u64) -> Patch {
@@ -20,7 +20,7 @@ pub(super) fn patch(seed: u64) -> Patch {
         CELLS,
         |x, y| height(seed, x, y),
         |p| {
-            let crease = (-p.z / 0.42).clamp(0.0, 1.0) as f32;
+            let crease = (-p.z / 0.24).clamp(0.0, 1.0) as f32;
             let cloud = fractal(seed + 9, p.x / 3.0, p.y / 3.0, [4, 4], 4) as f32;
             blend(raised, creased, crease) * (0.75 + 0.5 * cloud)
         },
@@ -38,8 +38,8 @@ fn height(seed: u64, x: f64, y: f64) -> f64 {
     let pebble = cell(seed + 3, u, v, period);
     let fine = cell(seed + 4, 3.0 * u, 3.0 * v, period.map(|p| 3 * p));
     let dome = |edge: f64| ((edge.min(1.0)) * FRAC_PI_2).sin();
-    let large = dome((pebble.second - pebble.first) / 0.45);
+    let large = dome((pebble.second - pebble.first) / 0.7);
     let small = dome((fine.second - fine.first) / 0.5);
     let pore = (1.0 - (fine.first / 0.16).min(1.0)).powi(2);
-    0.42 * (large - 1.0) + 0.07 * (small - 1.0) * large - 0.05 * pore + 0.08 * (pebble.own - 0.5) * large
+    0.24 * (large - 1.0) + 0.03 * (small - 1.0) * large - 0.03 * pore + 0.05 * (pebble.own - 0.5) * large
 }
