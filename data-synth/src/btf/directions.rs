@@ -25,9 +25,8 @@ pub struct BtfDirection {
 impl BtfDirection {
     /// All directions, in the order of the measurement.
     pub fn all() -> Vec<Self> {
-        let ring = |(theta_deg, count): (u16, u16)| {
-            (0..count).map(move |k| Self { theta_deg, phi_deg: k * (360 / count) })
-        };
+        let ring =
+            |(theta_deg, count): (u16, u16)| (0..count).map(move |k| Self { theta_deg, phi_deg: k * (360 / count) });
         RINGS.into_iter().flat_map(ring).collect()
     }
 

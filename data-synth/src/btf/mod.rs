@@ -73,7 +73,8 @@ impl BtfOptions {
     fn check(&self) -> Result<(), SynthError> {
         let within = |option: &'static str, value: usize, most: usize| {
             let ok = (1..=most).contains(&value);
-            let fault = || SynthError::Option { option, value: value.to_string(), allowed: format!("between 1 and {most}") };
+            let fault =
+                || SynthError::Option { option, value: value.to_string(), allowed: format!("between 1 and {most}") };
             if ok { Ok(()) } else { Err(fault()) }
         };
         within("size", self.size, 4096)?;
@@ -122,7 +123,8 @@ impl BtfStudio {
     /// The brightest there is but for one sample in two hundred, as a light meter would find it: on a
     /// coarse tile, in one view of each ring.
     fn metered(&self) -> Result<f32, SynthError> {
-        let coarse = BtfOptions { size: self.options.size.min(16), samples: self.options.samples.min(4), ..self.options };
+        let coarse =
+            BtfOptions { size: self.options.size.min(16), samples: self.options.samples.min(4), ..self.options };
         let mut peaks = Vec::new();
         for view in [0, 1, 7, 19, 37, 57] {
             let samples = self.view_at(&coarse, view)?;

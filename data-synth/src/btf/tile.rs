@@ -165,14 +165,18 @@ impl Copies {
         let slack = 1e-4 * patch.side;
         let shifts = |axis: usize| {
             let values = corners.map(|c| c[axis]);
-            let (low, high) = (values.into_iter().fold(f64::MAX, f64::min), values.into_iter().fold(f64::MIN, f64::max));
+            let (low, high) =
+                (values.into_iter().fold(f64::MAX, f64::min), values.into_iter().fold(f64::MIN, f64::max));
             let first = ((-slack - high) / patch.side).ceil() as i64;
             let last = ((patch.side + slack - low) / patch.side).floor() as i64;
             first..=last
         };
         let face = patch.mesh.faces[f].map(|v| v as usize);
-        let attributes =
-            Face { normal: normal.cast(), normals: face.map(|v| patch.normals[v]), colors: face.map(|v| patch.colors[v]) };
+        let attributes = Face {
+            normal: normal.cast(),
+            normals: face.map(|v| patch.normals[v]),
+            colors: face.map(|v| patch.colors[v]),
+        };
         for i in shifts(0) {
             for j in shifts(1) {
                 let shift = Vector3::new(i as f64, j as f64, 0.0) * patch.side;

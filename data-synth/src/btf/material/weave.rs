@@ -78,7 +78,8 @@ fn thread_path(seed: u64, thread: usize, is_warp: bool, pitch: f64) -> Vec<Vecto
         let over = if is_warp { (thread + other) % 4 < 2 } else { (thread + other) % 4 >= 2 };
         if over { 1.0 } else { -1.0 }
     };
-    let drift = |crossing: usize| 0.08 * (random(seed, [thread as i64, (crossing % THREADS) as i64, i64::from(is_warp)]) - 0.5);
+    let drift =
+        |crossing: usize| 0.08 * (random(seed, [thread as i64, (crossing % THREADS) as i64, i64::from(is_warp)]) - 0.5);
     let point = |k: usize| {
         let (crossing, t) = (k / POINTS, (k % POINTS) as f64 / POINTS as f64);
         // Half a cosine from one crossing to the next.

@@ -40,8 +40,11 @@ impl Yarn {
             let phase = TAU * ply as f64 / self.plies as f64;
             let middle = self.wound(path, share, self.turns, phase);
             let size = 1.0 - share;
-            let core: Vec<Section> =
-                self.frames(path).zip(&middle).map(|((u, v), &c)| ellipse(c, u * (0.85 * size), v * (0.85 * size))).collect();
+            let core: Vec<Section> = self
+                .frames(path)
+                .zip(&middle)
+                .map(|((u, v), &c)| ellipse(c, u * (0.85 * size), v * (0.85 * size)))
+                .collect();
             patch.tube(&core, CORE_SIDES, |_| self.color * 0.8);
             for fibre in 0..self.fibres {
                 self.fibre(patch, path, &middle, size, ply, fibre);
@@ -51,7 +54,15 @@ impl Yarn {
     }
 
     /// A helix around a ply, at a depth that wanders a little.
-    fn fibre(&self, patch: &mut Patch, path: &[Vector3<f64>], ply_path: &[Vector3<f64>], size: f64, ply: usize, fibre: usize) {
+    fn fibre(
+        &self,
+        patch: &mut Patch,
+        path: &[Vector3<f64>],
+        ply_path: &[Vector3<f64>],
+        size: f64,
+        ply: usize,
+        fibre: usize,
+    ) {
         let own = |k: i64| random(self.seed, [ply as i64, fibre as i64, k]);
         let phase = TAU * (fibre as f64 + 0.6 * own(0)) / self.fibres as f64;
         let thick = 0.9 * size * std::f64::consts::PI / self.fibres as f64;
