@@ -7,7 +7,7 @@
 //!
 //! - Values are linear radiance under unit irradiance perpendicular to the light: the cosine of the light
 //!   is in them. A white Lambertian plane is `cos θ / π`, whatever the view.
-//! - Texels are boxes on the reference plane z = 0, which cuts the surface near its mean height, so raised
+//! - Texels are boxes on the reference plane z = 0, which runs through the relief, so raised
 //!   points shift with the view. x runs right and y up: row 0 is at the largest y. Azimuths run from x to y.
 //! - The pattern is one period however many texels sample it, and the tile continues itself on all sides.
 
