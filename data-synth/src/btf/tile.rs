@@ -36,7 +36,7 @@ struct Face {
 }
 
 /// A point of the surface with its shading frame.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Point<'a> {
     /// In the cell.
     pub(crate) position: Vec3,

@@ -104,11 +104,12 @@ impl Yarn {
     /// A helix around the path, at `share` of the yarn's half widths.
     fn wound(&self, path: &[Vector3<f64>], share: f64, turns: f64, phase: f64) -> Vec<Vector3<f64>> {
         let last = (path.len() - 1) as f64;
-        let point = |(k, ((u, v), &p)): (usize, ((Vector3<f64>, Vector3<f64>), &Vector3<f64>))| {
+        let places = self.frames(path).zip(path).enumerate();
+        let helix = places.map(|(k, ((u, v), p))| {
             let (sin, cos) = (phase + TAU * turns * k as f64 / last).sin_cos();
             p + (u * cos + v * sin) * share
-        };
-        self.frames(path).zip(path).enumerate().map(point).collect()
+        });
+        helix.collect()
     }
 
     /// The half axes across the path at each point; the same at both ends of a period.
