@@ -13,6 +13,14 @@ pub enum SynthError {
         /// What there is, comma-separated.
         known: String,
     },
+    /// No material has this name.
+    #[error("no material is called \"{name}\"; choose one of {known}")]
+    UnknownMaterial {
+        /// What was asked for.
+        name: String,
+        /// What there is, comma-separated.
+        known: String,
+    },
     /// An option is out of its range.
     #[error("{option} is {value}; it must be {allowed}")]
     Option {

@@ -76,8 +76,9 @@ pub(crate) struct Picture {
 /// What is known of a pixel before radiance is.
 #[derive(Clone, Copy, Debug, Default)]
 struct Cover {
-    /// Which points of the grid of [`COVERAGE_SIDE`] meet the object, where they were tried.
+    /// Which points of the grid of [`COVERAGE_SIDE`] meet the object, where it was tried.
     points: u64,
+    is_tried: bool,
     is_full: bool,
     depth: f32,
     normal: Vec3,
@@ -197,10 +198,10 @@ impl Shot<'_> {
                 // A turning table smears what the middle of the exposure shows as full.
                 5 if self.lens.shutter_rad == 0.0 => cover,
                 0 if self.is_alone(&probed, x, y) => cover,
-                _ => Cover { points: self.grid(x, y), is_full: false, ..cover },
+                _ => Cover { points: self.grid(x, y), is_tried: true, is_full: false, ..cover },
             }
         });
-        let grids = covers.pixels().iter().zip(probed.pixels()).filter(|(c, _)| !c.is_full).count() as u64;
+        let grids = covers.pixels().iter().filter(|c| c.is_tried).count() as u64;
         let rays = ((width + 1) * (height + 1) + width * height) as u64;
         (covers, rays + grids * u64::from(COVERAGE_SIDE * COVERAGE_SIDE))
     }
@@ -213,7 +214,7 @@ impl Shot<'_> {
         world.first_hit(sight.origin, sight.direction).map_or(nothing, |hit| {
             let along = f64::from(hit.distance) * sight.direction.cast::<f64>().dot(&self.lens.camera.forward());
             let normal = world.shading_normal(hit, sight.direction);
-            Cover { points: 0, is_full: true, depth: along as f32, normal }
+            Cover { is_full: true, depth: along as f32, normal, ..nothing }
         })
     }
 

@@ -4,6 +4,8 @@
 //! pictures, mattes, exact cameras and the true surface; [`SynthCapture::write`] saves them as a
 //! capture folder. Everything is a function of scene, options and seed, whatever the thread count.
 //!
+//! [`btf`] measures materials under 81 × 81 directions of view and light.
+//!
 //! [`hull_truth`] knows the visual hulls of simple solids without carving them.
 //!
 //! This crate shares no shading code with `render` and knows no appearance: truth must not lean on
@@ -13,6 +15,7 @@
 //! thinner than half a pixel and shorter than one.
 
 mod accel;
+pub mod btf;
 mod error;
 mod faults;
 mod film;

@@ -44,6 +44,9 @@ pub(crate) struct General {
 pub(crate) enum Command {
     /// Draw a calibration board to print, to scale (.pdf .svg .png)
     Board(BoardArgs),
+    /// Bidirectional texture functions: materials under all views and lights
+    #[command(subcommand)]
+    Btf(BtfCommand),
     /// Compare the four methods on held-out views: table, plot, crops
     Compare(CompareArgs),
     /// Film a synthetic object, model it, compare the methods
@@ -60,6 +63,13 @@ pub(crate) enum Command {
     Render(RenderArgs),
     /// Render a synthetic capture whose truth is known
     Synth(SynthArgs),
+}
+
+/// What is done with bidirectional texture functions.
+#[derive(Debug, Subcommand)]
+pub(crate) enum BtfCommand {
+    /// Measure a synthetic material whose truth is known
+    Synth(BtfSynthArgs),
 }
 
 /// A calibrated folder and how it is read.
@@ -318,6 +328,28 @@ pub(crate) struct SynthArgs {
     pub(crate) video: Option<PathBuf>,
 }
 
+#[derive(Debug, Args)]
+pub(crate) struct BtfSynthArgs {
+    /// The material: corduroy, knit, weave, leather, bark, foil, or analytic
+    #[arg(value_name = "NAME")]
+    pub(crate) material: String,
+    /// The folder to write: a picture per view and light, btf.json
+    #[arg(short, long, value_name = "DATA")]
+    pub(crate) output: PathBuf,
+    /// Texels per side of the tile
+    #[arg(long, value_name = "TEXELS", default_value = "24", value_parser = texels)]
+    pub(crate) size: usize,
+    /// Write linear floats (.exr) instead of 8 bits (.png)
+    #[arg(long)]
+    pub(crate) hdr: bool,
+    /// Seed of everything random
+    #[arg(long, default_value = "1")]
+    pub(crate) seed: u64,
+    /// Paths per texel and view
+    #[arg(long, value_name = "N", default_value = "16", value_parser = samples)]
+    pub(crate) samples: u32,
+}
+
 /// A value, or left to us.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Auto<T>(pub(crate) Option<T>);
@@ -355,6 +387,14 @@ fn whole_factor(text: &str) -> Result<usize, String> {
 
 fn frames(text: &str) -> Result<usize, String> {
     bounded(text, 100_000)
+}
+
+fn texels(text: &str) -> Result<usize, String> {
+    bounded(text, 4096)
+}
+
+fn samples(text: &str) -> Result<u32, String> {
+    bounded(text, 65_536).map(|n| n as u32)
 }
 
 fn size(text: &str) -> Result<[usize; 2], String> {

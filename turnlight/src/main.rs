@@ -53,6 +53,7 @@ fn run(cli: &Cli) -> Result<(), Error> {
     let progress = Progress::new(cli.general.quiet, cli.general.verbose);
     let answer = match &cli.command {
         Command::Board(args) => commands::board::run(args),
+        Command::Btf(command) => commands::btf::run(command, &progress),
         Command::Compare(args) => commands::compare::run(args, &progress),
         Command::Demo(args) => commands::demo::run(args, &progress),
         Command::Hull(args) => commands::hull::run(args, &progress),

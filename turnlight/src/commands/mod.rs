@@ -1,6 +1,7 @@
 //! One file per command: read, call the library, answer.
 
 pub(crate) mod board;
+pub(crate) mod btf;
 pub(crate) mod compare;
 pub(crate) mod demo;
 pub(crate) mod hull;

@@ -62,8 +62,8 @@ fn layout(views: usize) -> Layout {
     }
 }
 
-/// Before a minute is spent on filming.
-fn refuse_occupied(output: &Path) -> Result<(), Error> {
+/// Before a minute is spent on the work.
+pub(super) fn refuse_occupied(output: &Path) -> Result<(), Error> {
     let is_free = !output.exists() || std::fs::read_dir(output).is_ok_and(|mut entries| entries.next().is_none());
     if is_free { Ok(()) } else { Err(SynthError::Exists { path: output.to_path_buf() }.into()) }
 }
