@@ -6,6 +6,10 @@
 
 use geometry::Mesh;
 use nalgebra::{Point3, Vector3};
+use std::f64::consts::{PI, TAU};
+
+/// A place or a direction.
+pub(crate) type P = Vector3<f64>;
 
 /// A mesh under construction with a part number per face.
 #[derive(Clone, Debug, Default)]
@@ -16,6 +20,33 @@ pub(crate) struct MeshBuilder {
     pub(crate) parts: Vec<u8>,
     /// The part of the faces to come.
     pub(crate) part: u8,
+}
+
+/// Quads left out between rings: from `low` for `size` rings and columns, which go around.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Hole {
+    /// First ring and first column.
+    pub(crate) low: [usize; 2],
+    /// Number of quads across rings and across columns.
+    pub(crate) size: [usize; 2],
+}
+
+impl Hole {
+    fn holds(&self, ring: usize, column: usize, around: usize) -> bool {
+        let past = (column + around - self.low[1]) % around;
+        (self.low[0]..self.low[0] + self.size[0]).contains(&ring) && past < self.size[1]
+    }
+
+    fn edge(&self, rings: &[Vec<u32>]) -> Vec<u32> {
+        let [r0, c0] = self.low;
+        let [rows, columns] = self.size;
+        let at = |r: usize, c: usize| rings[r0 + r][(c0 + c) % rings[r0].len()];
+        let bottom = (0..columns).map(|c| at(0, c));
+        let right = (0..rows).map(|r| at(r, columns));
+        let top = (1..=columns).rev().map(|c| at(rows, c));
+        let left = (1..=rows).rev().map(|r| at(r, 0));
+        bottom.chain(right).chain(top).chain(left).collect()
+    }
 }
 
 impl MeshBuilder {
@@ -32,6 +63,14 @@ impl MeshBuilder {
     pub(crate) fn rectangle(&mut self, half: [f64; 2], z: f64) -> Vec<u32> {
         let [x, y] = half;
         self.ring([[-x, -y, z], [x, -y, z], [x, y, z], [-x, y, z]])
+    }
+
+    /// The same faces with every vertex moved.
+    pub(crate) fn moved(mut self, place: impl Fn(P) -> P) -> Self {
+        for p in &mut self.mesh.positions {
+            *p = place(p.coords).map(|c| f64::from(c as f32)).into();
+        }
+        self
     }
 
     /// Adds one triangle.
@@ -81,6 +120,121 @@ impl MeshBuilder {
         self.bridge(outer, inner, true);
     }
 
+    /// Closes a loop that its middle sees whole by a fan around a new vertex at `tip`.
+    pub(crate) fn fan(&mut self, ring: &[u32], tip: P) {
+        let tip = self.ring([tip.into()])[0];
+        for i in 0..ring.len() {
+            self.face([ring[i], ring[(i + 1) % ring.len()], tip]);
+        }
+    }
+
+    /// [`MeshBuilder::fan`] facing the other way.
+    pub(crate) fn fan_reversed(&mut self, ring: &[u32], tip: P) {
+        let reversed: Vec<u32> = ring.iter().rev().copied().collect();
+        self.fan(&reversed, tip);
+    }
+
+    /// A closed tube along `path`: point `i` of ring `k` lies `offset(k, angle)` off the path, along the
+    /// two normals of a frame that does not twist (Wang et al., "Computation of Rotation Minimizing
+    /// Frames", TOG 2008), the first of which starts near `up`. Ends are capped by fans.
+    pub(crate) fn tube(&mut self, path: &[P], up: P, sides: usize, offset: impl Fn(usize, f64) -> [f64; 2]) {
+        let mut rings = Vec::with_capacity(path.len());
+        for (k, frame) in frames(path, up).into_iter().enumerate() {
+            let point = |i: usize| {
+                let [a, b] = offset(k, TAU * i as f64 / sides as f64);
+                (path[k] + frame[0] * a + frame[1] * b).into()
+            };
+            rings.push(self.ring((0..sides).map(point)));
+        }
+        self.loft(&rings);
+        if let (Some(first), Some(last)) = (rings.first(), rings.last()) {
+            self.fan_reversed(first, path[0]);
+            self.fan(last, path[path.len() - 1]);
+        }
+    }
+
+    /// A solid between a front and a back over `[0, 1]²`: `point(u, v)` gives both. The front is seen
+    /// with `u × v` towards the eye. `cells` are along u and v.
+    pub(crate) fn slab(&mut self, cells: [usize; 2], point: impl Fn(f64, f64) -> [P; 2]) {
+        let [nu, nv] = cells;
+        let at = |i: usize, j: usize| point(i as f64 / nu as f64, j as f64 / nv as f64);
+        let side = |face: usize| (0..=nv).flat_map(move |j| (0..=nu).map(move |i| (i, j, face)));
+        let [front, back] = [0, 1].map(|face| self.ring(side(face).map(|(i, j, f)| at(i, j)[f].into())));
+        let id = |i: usize, j: usize| j * (nu + 1) + i;
+        for (i, j) in (0..nv).flat_map(|j| (0..nu).map(move |i| (i, j))) {
+            let quad = [id(i, j), id(i + 1, j), id(i + 1, j + 1), id(i, j + 1)];
+            self.cap(&quad.map(|k| front[k]));
+            self.cap_reversed(&quad.map(|k| back[k]));
+        }
+        let rim = (0..nu)
+            .map(|i| id(i, 0))
+            .chain((0..nv).map(|j| id(nu, j)))
+            .chain((1..=nu).rev().map(|i| id(i, nv)))
+            .chain((1..=nv).rev().map(|j| id(0, j)));
+        let rim: Vec<usize> = rim.collect();
+        let [low, high] = [&back, &front].map(|face| rim.iter().map(|&k| face[k]).collect::<Vec<_>>());
+        self.walls(&low, &high);
+    }
+
+    /// A sheet of the given half thickness around the surface `middle(u, v)` over `[0, 1]²`.
+    pub(crate) fn sheet(&mut self, cells: [usize; 2], half: f64, middle: impl Fn(f64, f64) -> P) {
+        const H: f64 = 1e-3;
+        self.slab(cells, |u, v| {
+            let du = middle(u + H, v) - middle(u - H, v);
+            let dv = middle(u, v + H) - middle(u, v - H);
+            let n = du.cross(&dv).try_normalize(0.0).unwrap_or_else(P::z) * half;
+            let p = middle(u, v);
+            [p + n, p - n]
+        });
+    }
+
+    /// A ball with `n` rings' steps from pole to pole and `2 n` points around, moved to `point(direction)`,
+    /// which must keep the ball the right side out.
+    pub(crate) fn ball(&mut self, n: usize, point: impl Fn(P) -> P) {
+        let direction = |k: usize, i: usize| {
+            let (s, c) = (PI * k as f64 / n as f64).sin_cos();
+            let (sp, cp) = (PI * i as f64 / n as f64).sin_cos();
+            P::new(s * cp, s * sp, -c)
+        };
+        let rings: Vec<_> = (1..n).map(|k| self.ring((0..2 * n).map(|i| point(direction(k, i)).into()))).collect();
+        self.loft(&rings);
+        self.fan_reversed(&rings[0], point(-P::z()));
+        self.fan(&rings[n - 2], point(P::z()));
+    }
+
+    /// A box with half sizes `half` along the columns of a right-handed `frame`.
+    pub(crate) fn block(&mut self, center: P, frame: [P; 3], half: [f64; 3]) {
+        let [x, y, z] = [0, 1, 2].map(|a| frame[a] * half[a]);
+        self.slab([1, 1], |u, v| {
+            let p = center + x * (2.0 * u - 1.0) + y * (2.0 * v - 1.0);
+            [p + z, p - z]
+        });
+    }
+
+    /// Rings of a surface of revolution around the z axis, one per (radius, z), not yet joined.
+    pub(crate) fn revolve(&mut self, profile: &[[f64; 2]], around: usize) -> Vec<Vec<u32>> {
+        let circle = |&[r, z]: &[f64; 2]| {
+            let turn = move |i: usize| (TAU * i as f64 / around as f64).sin_cos();
+            self.ring((0..around).map(|i| [r * turn(i).1, r * turn(i).0, z]))
+        };
+        profile.iter().map(circle).collect()
+    }
+
+    /// [`MeshBuilder::loft`] that leaves `holes` open and returns their edges, counter-clockwise from
+    /// outside, starting at their lowest ring and first column.
+    pub(crate) fn loft_around(&mut self, rings: &[Vec<u32>], holes: &[Hole]) -> Vec<Vec<u32>> {
+        let n = rings.first().map_or(0, Vec::len);
+        for (k, pair) in rings.windows(2).enumerate() {
+            let (a, b) = (&pair[0], &pair[1]);
+            for i in (0..n).filter(|&i| !holes.iter().any(|h| h.holds(k, i, n))) {
+                let j = (i + 1) % n;
+                self.face([a[i], a[j], b[j]]);
+                self.face([a[i], b[j], b[i]]);
+            }
+        }
+        holes.iter().map(|h| h.edge(rings)).collect()
+    }
+
     fn bridge(&mut self, outer: &[u32], inner: &[u32], reversed: bool) {
         let (n, m) = (outer.len(), inner.len());
         let Some((start_o, start_i)) = self.closest(outer, inner) else { return };
@@ -110,6 +264,36 @@ impl MeshBuilder {
     fn distance(&self, a: u32, b: u32) -> f64 {
         nalgebra::distance(&self.mesh.positions[a as usize], &self.mesh.positions[b as usize])
     }
+}
+
+/// Two unit normals per point of a polyline that turn as little as they can, by double reflection
+/// (Wang et al. 2008); with the tangent they are right-handed.
+pub(crate) fn frames(path: &[P], up: P) -> Vec<[P; 2]> {
+    let tangents = tangents(path);
+    let Some(&first) = tangents.first() else { return Vec::new() };
+    let mut normal = across(up, first);
+    let mut frames = vec![[normal, first.cross(&normal)]];
+    for k in 1..path.len() {
+        let step = path[k] - path[k - 1];
+        let mirrored = |v: P, m: P| v - m * (2.0 * m.dot(&v) / m.norm_squared().max(1e-30));
+        let tangent = mirrored(tangents[k - 1], step);
+        normal = across(mirrored(mirrored(normal, step), tangents[k] - tangent), tangents[k]);
+        frames.push([normal, tangents[k].cross(&normal)]);
+    }
+    frames
+}
+
+/// Unit tangents by central differences.
+fn tangents(path: &[P]) -> Vec<P> {
+    let last = path.len().saturating_sub(1);
+    let at = |k: usize| (path[(k + 1).min(last)] - path[k.saturating_sub(1)]).try_normalize(0.0).unwrap_or_else(P::z);
+    (0..path.len()).map(at).collect()
+}
+
+/// The unit vector nearest `v` that is perpendicular to the unit vector `axis`.
+pub(crate) fn across(v: P, axis: P) -> P {
+    let off = |v: P| (v - axis * axis.dot(&v)).try_normalize(1e-9);
+    off(v).or_else(|| off(P::x())).or_else(|| off(P::y())).unwrap_or_else(P::z)
 }
 
 /// Shading normals at the corners of every face: the area-weighted mean of the faces around the

@@ -1,7 +1,9 @@
-//! The objects. To add one: a file with `build` and `albedo`, a variant in [`Scene`] and in
-//! [`Paint`]; the compiler lists the rest.
+//! The objects. To add one: a file with `build`, `albedo` and `finishes`, and a variant in [`Scene`];
+//! the compiler lists the rest. `docs/synthetic-scenes.md` is the catalogue.
 
+mod chance;
 mod elephant;
+mod house;
 mod temple;
 
 use crate::error::SynthError;
@@ -12,13 +14,15 @@ use geometry::Mesh;
 use std::fmt;
 use std::str::FromStr;
 
-/// A procedural object, in metres, standing on z = 0 around the z axis.
+/// A procedural object, in metres, standing on z = 0 around the z axis; its best side faces +x.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Scene {
     /// A small Greek temple of matt, weathered stone with a tiled roof.
     Temple,
     /// A glazed elephant figurine in jade green with a painted saddle cloth.
     Elephant,
+    /// A log cottage of L-shaped plan with bark, shingles and moss in relief.
+    House,
 }
 
 /// How a scene is coloured.
@@ -27,8 +31,8 @@ pub(crate) enum Paint {
     /// One colour: for tests with closed forms.
     #[cfg_attr(not(test), expect(dead_code, reason = "closed-form tests need a plain surface"))]
     Plain(Vec3),
-    Temple,
-    Elephant,
+    /// As the scene says.
+    Scene(Scene),
 }
 
 /// A scene ready to be filmed.
@@ -42,13 +46,14 @@ pub(crate) struct Built {
 
 impl Scene {
     /// Every scene, in the order of a listing.
-    pub const ALL: [Self; 2] = [Self::Temple, Self::Elephant];
+    pub const ALL: [Self; 3] = [Self::Temple, Self::Elephant, Self::House];
 
     /// The name on the command line.
     pub fn name(self) -> &'static str {
         match self {
             Self::Temple => "temple",
             Self::Elephant => "elephant",
+            Self::House => "house",
         }
     }
 
@@ -57,10 +62,12 @@ impl Scene {
         match self {
             Self::Temple => "a small Greek temple of matt, weathered stone",
             Self::Elephant => "a glazed elephant figurine with a painted saddle cloth",
+            Self::House => "a log cottage with an inner corner; bark, shingles and moss in relief",
         }
     }
 
-    /// The true surface: closed, counter-clockwise from outside, in metres.
+    /// The true surface: counter-clockwise from outside, in metres; every edge has two faces. Scenes
+    /// glued from several pieces are several closed surfaces that may run into each other.
     pub fn mesh(self) -> Mesh {
         self.shape().mesh
     }
@@ -69,18 +76,33 @@ impl Scene {
         match self {
             Self::Temple => temple::build(),
             Self::Elephant => elephant::build(),
+            Self::House => house::build(),
+        }
+    }
+
+    /// What its parts are made of, by part.
+    fn finishes(self) -> Vec<Finish> {
+        match self {
+            Self::Temple => vec![Finish::Matt],
+            Self::Elephant => elephant::finishes(),
+            Self::House => house::finishes(),
+        }
+    }
+
+    /// Faces that meet at a sharper angle are shaded as an edge.
+    fn crease_deg(self) -> f64 {
+        match self {
+            Self::Temple => 32.0,
+            Self::House => 40.0,
+            Self::Elephant => 60.0,
         }
     }
 
     /// Builds the object for tracing.
     pub(crate) fn build(self) -> Built {
         let MeshBuilder { mesh, parts, .. } = self.shape();
-        let (crease_deg, paint, finishes) = match self {
-            Self::Temple => (32.0_f64, Paint::Temple, vec![Finish::Matt]),
-            Self::Elephant => (60.0, Paint::Elephant, elephant::finishes()),
-        };
-        let normals = crate::shape::corner_normals(&mesh, crease_deg.to_radians());
-        let world = World::new(&mesh, &normals, &parts, paint, finishes);
+        let normals = crate::shape::corner_normals(&mesh, self.crease_deg().to_radians());
+        let world = World::new(&mesh, &normals, &parts, Paint::Scene(self), self.finishes());
         Built { mesh, world }
     }
 }
@@ -108,8 +130,9 @@ impl Paint {
     pub(crate) fn albedo(&self, p: Vec3, normal: Vec3, part: u8) -> Vec3 {
         match self {
             Self::Plain(color) => *color,
-            Self::Temple => temple::albedo(p, normal, part),
-            Self::Elephant => elephant::albedo(p, part),
+            Self::Scene(Scene::Temple) => temple::albedo(p, normal, part),
+            Self::Scene(Scene::Elephant) => elephant::albedo(p, part),
+            Self::Scene(Scene::House) => house::albedo(p, normal, part),
         }
     }
 }
@@ -135,11 +158,10 @@ mod tests {
     fn albedo_is_physical_everywhere() {
         for scene in Scene::ALL {
             let shape = scene.shape();
-            let paint = if scene == Scene::Temple { Paint::Temple } else { Paint::Elephant };
             for f in 0..shape.mesh.faces.len() {
                 let p = shape.mesh.corners(f)[0].coords.cast();
                 let n = shape.mesh.face_area_vector(f).try_normalize(0.0).unwrap_or_default().cast();
-                let c = paint.albedo(p, n, shape.parts[f]);
+                let c = Paint::Scene(scene).albedo(p, n, shape.parts[f]);
                 assert!(c.iter().all(|c| (0.0..=1.0).contains(c)), "{scene}: {c}");
             }
         }
