@@ -211,13 +211,79 @@ impl MeshBuilder {
         });
     }
 
-    /// Rings of a surface of revolution around the z axis, one per (radius, z), not yet joined.
-    pub(crate) fn revolve(&mut self, profile: &[[f64; 2]], around: usize) -> Vec<Vec<u32>> {
-        let circle = |&[r, z]: &[f64; 2]| {
-            let turn = move |i: usize| (TAU * i as f64 / around as f64).sin_cos();
-            self.ring((0..around).map(|i| [r * turn(i).1, r * turn(i).0, z]))
-        };
-        profile.iter().map(circle).collect()
+    /// Rings of a surface of revolution around the z axis, one per (radius, z), not yet joined;
+    /// `stretch(ring, angle)` scales the radius.
+    pub(crate) fn revolve(
+        &mut self,
+        profile: &[[f64; 2]],
+        around: usize,
+        stretch: impl Fn(usize, f64) -> f64,
+    ) -> Vec<Vec<u32>> {
+        let mut rings = Vec::with_capacity(profile.len());
+        for (k, &[radius, z]) in profile.iter().enumerate() {
+            let point = |i: usize| {
+                let turn = TAU * i as f64 / around as f64;
+                let r = radius * stretch(k, turn);
+                [r * turn.cos(), r * turn.sin(), z]
+            };
+            rings.push(self.ring((0..around).map(point)));
+        }
+        rings
+    }
+
+    /// Closes the first and the last of the rings of a surface of revolution on the axis.
+    pub(crate) fn close_poles(&mut self, rings: &[Vec<u32>]) {
+        let height = |b: &Self, ring: &[u32]| P::z() * ring.first().map_or(0.0, |&v| b.mesh.positions[v as usize].z);
+        if let (Some(first), Some(last)) = (rings.first(), rings.last()) {
+            let (low, high) = (height(self, first), height(self, last));
+            self.fan_reversed(first, low);
+            self.fan(last, high);
+        }
+    }
+
+    /// A tube that grows out of the edge of a hole along `path`, which starts in the hole's middle: over
+    /// the first `blend` rings its section turns from the hole's outline into `half(k)`, the half axes
+    /// of an ellipse along the normals of [`frames`]. Returns the last ring.
+    pub(crate) fn sleeve(
+        &mut self,
+        hole: &[u32],
+        path: &[P],
+        up: P,
+        blend: usize,
+        half: impl Fn(usize) -> [f64; 2],
+    ) -> Vec<u32> {
+        let frames = frames(path, up);
+        let Some(&[u, v]) = frames.first() else { return hole.to_vec() };
+        let starts: Vec<P> = hole.iter().map(|&i| self.mesh.positions[i as usize].coords - path[0]).collect();
+        let mut last = hole.to_vec();
+        for k in 1..path.len() {
+            let t = (k as f64 / blend as f64).min(1.0);
+            let t = t * t * (3.0 - 2.0 * t);
+            let [a, b] = half(k);
+            let point = |start: &P| {
+                let (along_u, along_v) = (start.dot(&u), start.dot(&v));
+                let angle = along_v.atan2(along_u);
+                // What is left of the hole's own outline, its bulge along the path included.
+                let lift = start.dot(&u.cross(&v));
+                let (x, y) = (along_u + (a * angle.cos() - along_u) * t, along_v + (b * angle.sin() - along_v) * t);
+                let tangent = frames[k][0].cross(&frames[k][1]);
+                (path[k] + frames[k][0] * x + frames[k][1] * y + tangent * (lift * (1.0 - t))).into()
+            };
+            let ring = self.ring(starts.iter().map(point).collect::<Vec<[f64; 3]>>());
+            self.walls(&last, &ring);
+            last = ring;
+        }
+        last
+    }
+
+    /// Joins two sleeves that meet: their last rings, each counter-clockwise seen from the other.
+    pub(crate) fn join(&mut self, a: &[u32], b: &[u32]) {
+        let n = a.len();
+        let turned = |shift: usize| -> Vec<u32> { (0..n).map(|i| b[(shift + n - i) % n]).collect() };
+        let gap = |ring: &[u32]| -> f64 { a.iter().zip(ring).map(|(&p, &q)| self.distance(p, q)).sum() };
+        if let Some(ring) = (0..n).map(turned).min_by(|p, q| gap(p).total_cmp(&gap(q))) {
+            self.walls(a, &ring);
+        }
     }
 
     /// [`MeshBuilder::loft`] that leaves `holes` open and returns their edges, counter-clockwise from
@@ -288,6 +354,24 @@ fn tangents(path: &[P]) -> Vec<P> {
     let last = path.len().saturating_sub(1);
     let at = |k: usize| (path[(k + 1).min(last)] - path[k.saturating_sub(1)]).try_normalize(0.0).unwrap_or_else(P::z);
     (0..path.len()).map(at).collect()
+}
+
+/// A Catmull–Rom curve through `points`, `steps` segments between two of them; ends are doubled.
+pub(crate) fn curve(points: &[P], steps: usize) -> Vec<P> {
+    let last = points.len().saturating_sub(1);
+    let at = |k: usize| points[k.min(last)];
+    let mut path = Vec::with_capacity(last * steps + 1);
+    for k in 0..last {
+        let [a, b, c, d] = [at(k.saturating_sub(1)), at(k), at(k + 1), at(k + 2)];
+        path.extend((0..steps).map(|i| {
+            let t = i as f64 / steps as f64;
+            let slope = [(c - a) * 0.5, (d - b) * 0.5];
+            let (t2, t3) = (t * t, t * t * t);
+            b * (2.0 * t3 - 3.0 * t2 + 1.0) + c * (3.0 * t2 - 2.0 * t3) + slope[0] * (t3 - 2.0 * t2 + t) + slope[1] * (t3 - t2)
+        }));
+    }
+    path.extend(points.last());
+    path
 }
 
 /// The unit vector nearest `v` that is perpendicular to the unit vector `axis`.

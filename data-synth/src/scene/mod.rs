@@ -2,9 +2,12 @@
 //! the compiler lists the rest. `docs/synthetic-scenes.md` is the catalogue.
 
 mod chance;
+mod chrome;
 mod elephant;
 mod house;
+mod mug;
 mod temple;
+mod wreath;
 
 use crate::error::SynthError;
 use crate::material::{Finish, Vec3};
@@ -23,6 +26,12 @@ pub enum Scene {
     Elephant,
     /// A log cottage of L-shaped plan with bark, shingles and moss in relief.
     House,
+    /// A straw wreath with flowers and a bow, of stalks thinner than a pixel.
+    Wreath,
+    /// A glazed mug with a handle, painted with boats.
+    Mug,
+    /// A silvered teapot with ebony handle and knob.
+    Chrome,
 }
 
 /// How a scene is coloured.
@@ -46,7 +55,7 @@ pub(crate) struct Built {
 
 impl Scene {
     /// Every scene, in the order of a listing.
-    pub const ALL: [Self; 3] = [Self::Temple, Self::Elephant, Self::House];
+    pub const ALL: [Self; 6] = [Self::Temple, Self::Elephant, Self::House, Self::Wreath, Self::Mug, Self::Chrome];
 
     /// The name on the command line.
     pub fn name(self) -> &'static str {
@@ -54,6 +63,9 @@ impl Scene {
             Self::Temple => "temple",
             Self::Elephant => "elephant",
             Self::House => "house",
+            Self::Wreath => "wreath",
+            Self::Mug => "mug",
+            Self::Chrome => "chrome",
         }
     }
 
@@ -63,6 +75,9 @@ impl Scene {
             Self::Temple => "a small Greek temple of matt, weathered stone",
             Self::Elephant => "a glazed elephant figurine with a painted saddle cloth",
             Self::House => "a log cottage with an inner corner; bark, shingles and moss in relief",
+            Self::Wreath => "a straw wreath with flowers; stalks thinner than a pixel",
+            Self::Mug => "a glazed mug painted with boats, with a handle and a deep cavity",
+            Self::Chrome => "a silvered teapot: a mirror with a spout and a handle",
         }
     }
 
@@ -77,6 +92,9 @@ impl Scene {
             Self::Temple => temple::build(),
             Self::Elephant => elephant::build(),
             Self::House => house::build(),
+            Self::Wreath => wreath::build(),
+            Self::Mug => mug::build(),
+            Self::Chrome => chrome::build(),
         }
     }
 
@@ -86,6 +104,9 @@ impl Scene {
             Self::Temple => vec![Finish::Matt],
             Self::Elephant => elephant::finishes(),
             Self::House => house::finishes(),
+            Self::Wreath => wreath::finishes(),
+            Self::Mug => mug::finishes(),
+            Self::Chrome => chrome::finishes(),
         }
     }
 
@@ -95,6 +116,9 @@ impl Scene {
             Self::Temple => 32.0,
             Self::House => 40.0,
             Self::Elephant => 60.0,
+            Self::Wreath => 60.0,
+            Self::Mug => 60.0,
+            Self::Chrome => 60.0,
         }
     }
 
@@ -133,6 +157,9 @@ impl Paint {
             Self::Scene(Scene::Temple) => temple::albedo(p, normal, part),
             Self::Scene(Scene::Elephant) => elephant::albedo(p, part),
             Self::Scene(Scene::House) => house::albedo(p, normal, part),
+            Self::Scene(Scene::Wreath) => wreath::albedo(p, part),
+            Self::Scene(Scene::Mug) => mug::albedo(p, part),
+            Self::Scene(Scene::Chrome) => chrome::albedo(p, part),
         }
     }
 }

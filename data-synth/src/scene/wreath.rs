@@ -87,8 +87,8 @@ fn stalk(b: &mut MeshBuilder, chance: &mut Chance) {
     let length = chance.between(0.028, 0.075);
     let pitch = chance.between(0.1, 0.5);
     let depth = MINOR * (0.955 + 0.10 * chance.unit());
-    // One in five leaves the bundle, by up to half its radius.
-    let stray = if chance.unit() < 0.2 { chance.between(0.2, 1.0) } else { chance.unit() * 0.06 };
+    // One in four leaves the bundle, by up to most of its radius.
+    let stray = if chance.unit() < 0.25 { chance.between(0.2, 1.6) } else { chance.unit() * 0.06 };
     let (lift, bend) = (stray * 0.0105, chance.around(0.5));
     let path: Vec<P> = (0..=STEPS)
         .map(|k| {
@@ -163,7 +163,7 @@ fn garland(b: &mut MeshBuilder, chance: &mut Chance) {
     for k in 0..30 {
         let turn = (108.0 + 236.0 * f64::from(k) / 29.0).to_radians();
         let (at, out) = ring(turn, chance.between(-0.9, 1.2), MINOR);
-        let towards = (onward(turn) * chance.around(1.0) + out * 0.5 + chance.jitter(0.5)).normalize();
+        let towards = (onward(turn) * chance.around(1.0) + out * 0.15 + chance.jitter(0.4)).normalize();
         leaf(b, at, towards, out, chance);
     }
 }
@@ -315,7 +315,8 @@ fn bow(b: &mut MeshBuilder) {
             let angle = TAU * t;
             let (reach, open) = (0.5 - 0.5 * angle.cos(), angle.sin());
             let width = 0.0085 * (0.35 + 0.65 * reach);
-            let middle = level * (side * 0.036 * reach) + P::x() * (0.0085 * open + 0.004 * reach)
+            let middle = level * (side * 0.036 * reach)
+                + P::x() * (0.0115 * open + 0.004 * reach)
                 + up * (0.008 * reach + 0.0025 * open);
             knot + middle + up * ((2.0 * u - 1.0) * width) + P::x() * (0.0008 * (9.0 * u + 5.0 * t).sin() * reach)
         });
