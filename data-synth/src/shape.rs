@@ -37,15 +37,19 @@ impl Hole {
         (self.low[0]..self.low[0] + self.size[0]).contains(&ring) && past < self.size[1]
     }
 
-    fn edge(&self, rings: &[Vec<u32>]) -> Vec<u32> {
-        let [r0, c0] = self.low;
+    /// Row and column of the points around the hole, counter-clockwise from outside.
+    fn outline(&self) -> Vec<(usize, usize)> {
         let [rows, columns] = self.size;
-        let at = |r: usize, c: usize| rings[r0 + r][(c0 + c) % rings[r0].len()];
-        let bottom = (0..columns).map(|c| at(0, c));
-        let right = (0..rows).map(|r| at(r, columns));
-        let top = (1..=columns).rev().map(|c| at(rows, c));
-        let left = (1..=rows).rev().map(|r| at(r, 0));
+        let bottom = (0..columns).map(|c| (0, c));
+        let right = (0..rows).map(|r| (r, columns));
+        let top = (1..=columns).rev().map(|c| (rows, c));
+        let left = (1..=rows).rev().map(|r| (r, 0));
         bottom.chain(right).chain(top).chain(left).collect()
+    }
+
+    fn vertex(&self, rings: &[Vec<u32>], row: usize, column: usize) -> u32 {
+        let ring = &rings[self.low[0] + row];
+        ring[(self.low[1] + column) % ring.len()]
     }
 }
 
@@ -241,6 +245,29 @@ impl MeshBuilder {
         }
     }
 
+    /// Moves the edge of a rectangular hole along the surface onto the ellipse it contains, by drawing every
+    /// point towards the middle: `(x, y) max(|x|, |y|) / √(x² + y²)`.
+    fn round(&mut self, hole: &Hole, rings: &[Vec<u32>]) {
+        let [rows, columns] = hole.size;
+        let radius_height = |b: &Self, row: usize| {
+            let p = b.mesh.positions[rings[row][0] as usize];
+            [p.x.hypot(p.y), p.z]
+        };
+        let profile: Vec<[f64; 2]> = (0..=rows).map(|r| radius_height(self, hole.low[0] + r)).collect();
+        let turn = TAU / rings[0].len() as f64;
+        for (r, c) in hole.outline() {
+            let (x, y) = (2.0 * c as f64 / columns as f64 - 1.0, 2.0 * r as f64 / rows as f64 - 1.0);
+            let shrink = x.abs().max(y.abs()) / x.hypot(y);
+            let row = 0.5 * rows as f64 * (1.0 + y * shrink);
+            let k = (row as usize).min(rows - 1);
+            let [radius, z] = [0, 1].map(|a| profile[k][a] + (profile[k + 1][a] - profile[k][a]) * (row - k as f64));
+            let angle = turn * (hole.low[1] as f64 + 0.5 * columns as f64 * (1.0 + x * shrink));
+            let place = Point3::new(radius * angle.cos(), radius * angle.sin(), z);
+            let vertex = hole.vertex(rings, r, c);
+            self.mesh.positions[vertex as usize] = place.map(|c| f64::from(c as f32));
+        }
+    }
+
     /// A tube that grows out of the edge of a hole along `path`, which starts in the hole's middle: over
     /// the first `blend` rings its section turns from the hole's outline into `half(k)`, the half axes
     /// of an ellipse along the normals of [`frames`]. Returns the last ring.
@@ -286,9 +313,10 @@ impl MeshBuilder {
         }
     }
 
-    /// [`MeshBuilder::loft`] that leaves `holes` open and returns their edges, counter-clockwise from
-    /// outside, starting at their lowest ring and first column.
+    /// [`MeshBuilder::loft`] of a surface of revolution that leaves `holes` open, rounds them, and returns
+    /// their edges, counter-clockwise from outside.
     pub(crate) fn loft_around(&mut self, rings: &[Vec<u32>], holes: &[Hole]) -> Vec<Vec<u32>> {
+        holes.iter().for_each(|h| self.round(h, rings));
         let n = rings.first().map_or(0, Vec::len);
         for (k, pair) in rings.windows(2).enumerate() {
             let (a, b) = (&pair[0], &pair[1]);
@@ -298,7 +326,8 @@ impl MeshBuilder {
                 self.face([a[i], b[j], b[i]]);
             }
         }
-        holes.iter().map(|h| h.edge(rings)).collect()
+        let edge = |h: &Hole| h.outline().into_iter().map(|(r, c)| h.vertex(rings, r, c)).collect();
+        holes.iter().map(edge).collect()
     }
 
     fn bridge(&mut self, outer: &[u32], inner: &[u32], reversed: bool) {
@@ -367,11 +396,26 @@ pub(crate) fn curve(points: &[P], steps: usize) -> Vec<P> {
             let t = i as f64 / steps as f64;
             let slope = [(c - a) * 0.5, (d - b) * 0.5];
             let (t2, t3) = (t * t, t * t * t);
-            b * (2.0 * t3 - 3.0 * t2 + 1.0) + c * (3.0 * t2 - 2.0 * t3) + slope[0] * (t3 - 2.0 * t2 + t) + slope[1] * (t3 - t2)
+            b * (2.0 * t3 - 3.0 * t2 + 1.0)
+                + c * (3.0 * t2 - 2.0 * t3)
+                + slope[0] * (t3 - 2.0 * t2 + t)
+                + slope[1] * (t3 - t2)
         }));
     }
     path.extend(points.last());
     path
+}
+
+/// The two halves of a handle between `low` and `high`, each from its foot to where they nearly meet, at
+/// `reach` from between the feet: half an ellipse that leaves both along `reach`.
+pub(crate) fn ear(low: P, high: P, reach: P, steps: usize) -> [Vec<P>; 2] {
+    [-1.0, 1.0].map(|sign| {
+        let at = |k: usize| {
+            let (s, c) = (0.5 * PI * (1.0 - 0.97 * k as f64 / steps as f64)).sin_cos();
+            low.lerp(&high, 0.5 + 0.5 * sign * s) + reach * c
+        };
+        (0..=steps).map(at).collect()
+    })
 }
 
 /// The unit vector nearest `v` that is perpendicular to the unit vector `axis`.

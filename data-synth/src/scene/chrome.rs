@@ -2,7 +2,7 @@
 //! handle. One piece, genus one: the spout is stopped a little below its lip.
 
 use crate::material::{Finish, Vec3};
-use crate::shape::{Hole, MeshBuilder, P, curve};
+use crate::shape::{Hole, MeshBuilder, P, curve, ear};
 use crate::texture_field::{blend, color, fractal};
 
 const METAL: u8 = 0;
@@ -15,13 +15,41 @@ pub(crate) fn build() -> MeshBuilder {
     let mut b = MeshBuilder { part: METAL, ..MeshBuilder::default() };
     // Foot, belly, shoulder, the groove of the lid, the lid, the knob: (radius, height).
     let body = [
-        [0.008, 0.0018], [0.020, 0.0018], [0.0285, 0.0012], [0.0300, 0.0], [0.0322, 0.0], [0.0326, 0.0022],
-        [0.0312, 0.0050], [0.0330, 0.0078], [0.0405, 0.0125], [0.0490, 0.0210], [0.0545, 0.0330], [0.0555, 0.0440],
-        [0.0525, 0.0545], [0.0455, 0.0632], [0.0370, 0.0690], [0.0322, 0.0712], [0.0312, 0.0732], [0.0304, 0.0736],
-        [0.0298, 0.0724], [0.0292, 0.0734], [0.0270, 0.0762], [0.0215, 0.0806], [0.0130, 0.0842], [0.0062, 0.0856],
+        [0.008, 0.0018],
+        [0.020, 0.0018],
+        [0.0285, 0.0012],
+        [0.0300, 0.0],
+        [0.0322, 0.0],
+        [0.0326, 0.0022],
+        [0.0312, 0.0050],
+        [0.0330, 0.0078],
+        [0.0405, 0.0125],
+        [0.0490, 0.0210],
+        [0.0545, 0.0330],
+        [0.0555, 0.0440],
+        [0.0525, 0.0545],
+        [0.0455, 0.0632],
+        [0.0370, 0.0690],
+        [0.0322, 0.0712],
+        [0.0312, 0.0732],
+        [0.0304, 0.0736],
+        [0.0298, 0.0724],
+        [0.0292, 0.0734],
+        [0.0270, 0.0762],
+        [0.0215, 0.0806],
+        [0.0130, 0.0842],
+        [0.0062, 0.0856],
         [0.0048, 0.0868],
     ];
-    let knob = [[0.0048, 0.0868], [0.0042, 0.0885], [0.0062, 0.0915], [0.0085, 0.0955], [0.0078, 0.0995], [0.0045, 0.1020], [0.0012, 0.1026]];
+    let knob = [
+        [0.0048, 0.0868],
+        [0.0042, 0.0885],
+        [0.0062, 0.0915],
+        [0.0085, 0.0955],
+        [0.0078, 0.0995],
+        [0.0045, 0.1020],
+        [0.0012, 0.1026],
+    ];
     const STEPS: usize = 6;
     let smooth = |points: &[[f64; 2]]| -> Vec<[f64; 2]> {
         let places: Vec<P> = points.iter().map(|&[r, z]| P::new(r, 0.0, z)).collect();
@@ -53,16 +81,22 @@ pub(crate) fn build() -> MeshBuilder {
 
 fn spout(b: &mut MeshBuilder, edge: &[u32]) {
     let at = |y: f64, z: f64| P::new(0.0, y, z);
-    let points =
-        [at(0.0535, 0.0372), at(0.0625, 0.0395), at(0.0745, 0.0465), at(0.0825, 0.0590), at(0.0890, 0.0700), at(0.0965, 0.0762)];
-    let path = curve(&points, 12);
+    let points = [
+        at(0.0525, 0.0375),
+        at(0.0640, 0.0410),
+        at(0.0745, 0.0485),
+        at(0.0820, 0.0585),
+        at(0.0885, 0.0685),
+        at(0.0970, 0.0755),
+    ];
+    let path = curve(&points, 14);
     let last = path.len() - 1;
     let half = |k: usize| {
         let t = k as f64 / last as f64;
         let flare = 0.0016 * ((t - 0.86).max(0.0) / 0.14).powi(2);
         [0.0155 * (1.0 - t).powf(1.3) + 0.0062 + flare, 0.0150 * (1.0 - t).powf(1.3) + 0.0058 + flare]
     };
-    let lip = b.sleeve(edge, &path, P::x(), 14, half);
+    let lip = b.sleeve(edge, &path, P::x(), 30, half);
     // Over the lip and a little way in.
     let tangent = (path[last] - path[last - 1]).normalize();
     let place = |b: &MeshBuilder, shrink: f64, up: f64| -> Vec<[f64; 3]> {
@@ -73,7 +107,9 @@ fn spout(b: &mut MeshBuilder, edge: &[u32]) {
         lip.iter().map(inward).collect()
     };
     let mut rings = vec![lip.clone()];
-    for (shrink, up) in [(0.985, 0.0006), (0.93, 0.0009), (0.86, 0.0006), (0.82, -0.0004), (0.76, -0.004), (0.70, -0.009)] {
+    for (shrink, up) in
+        [(0.985, 0.0006), (0.93, 0.0009), (0.86, 0.0006), (0.82, -0.0004), (0.76, -0.004), (0.70, -0.009)]
+    {
         let points = place(b, shrink, up);
         rings.push(b.ring(points));
     }
@@ -82,12 +118,11 @@ fn spout(b: &mut MeshBuilder, edge: &[u32]) {
 }
 
 fn handle(b: &mut MeshBuilder, edges: &[Vec<u32>], [low, high]: [f64; 2]) {
-    let at = |y: f64, z: f64| P::new(0.0, -y, z);
-    let bottom = [at(0.0538, low), at(0.0620, low - 0.0005), at(0.0760, low + 0.0030), at(0.0905, low + 0.0175), at(0.0925, 0.0545)];
-    let top = [at(0.0468, high), at(0.0550, high + 0.0055), at(0.0700, high + 0.0105), at(0.0880, high + 0.0055), at(0.0925, 0.0565)];
-    let half = |k: usize| [0.0052 + 0.0008 * (k as f64 / 40.0), 0.0040];
-    let lower = b.sleeve(&edges[0], &curve(&bottom, 10), P::x(), 9, half);
-    let upper = b.sleeve(&edges[1], &curve(&top, 10), P::x(), 9, half);
+    let foot = |y: f64, z: f64| P::new(0.0, -y, z);
+    let [bottom, top] = ear(foot(0.0535, low), foot(0.0462, high), P::new(0.0, -0.043, 0.006), 36);
+    let half = |k: usize| [0.0046 + 0.0010 * (k as f64 / 36.0), 0.0038];
+    let lower = b.sleeve(&edges[0], &bottom, P::x(), 9, half);
+    let upper = b.sleeve(&edges[1], &top, P::x(), 9, half);
     b.join(&upper, &lower);
 }
 

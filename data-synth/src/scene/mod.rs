@@ -5,7 +5,9 @@ mod chance;
 mod chrome;
 mod elephant;
 mod house;
+mod knot;
 mod mug;
+mod plate;
 mod temple;
 mod wreath;
 
@@ -32,6 +34,10 @@ pub enum Scene {
     Mug,
     /// A silvered teapot with ebony handle and knob.
     Chrome,
+    /// A thin Delft plate on a wooden stand.
+    Plate,
+    /// A trefoil knot of three-stranded rope.
+    Knot,
 }
 
 /// How a scene is coloured.
@@ -55,7 +61,8 @@ pub(crate) struct Built {
 
 impl Scene {
     /// Every scene, in the order of a listing.
-    pub const ALL: [Self; 6] = [Self::Temple, Self::Elephant, Self::House, Self::Wreath, Self::Mug, Self::Chrome];
+    pub const ALL: [Self; 8] =
+        [Self::Temple, Self::Elephant, Self::House, Self::Wreath, Self::Mug, Self::Chrome, Self::Plate, Self::Knot];
 
     /// The name on the command line.
     pub fn name(self) -> &'static str {
@@ -66,6 +73,8 @@ impl Scene {
             Self::Wreath => "wreath",
             Self::Mug => "mug",
             Self::Chrome => "chrome",
+            Self::Plate => "plate",
+            Self::Knot => "knot",
         }
     }
 
@@ -78,6 +87,8 @@ impl Scene {
             Self::Wreath => "a straw wreath with flowers; stalks thinner than a pixel",
             Self::Mug => "a glazed mug painted with boats, with a handle and a deep cavity",
             Self::Chrome => "a silvered teapot: a mirror with a spout and a handle",
+            Self::Plate => "a thin Delft plate with a windmill, leaning on a stand",
+            Self::Knot => "a trefoil knot of rope that hides itself",
         }
     }
 
@@ -95,6 +106,8 @@ impl Scene {
             Self::Wreath => wreath::build(),
             Self::Mug => mug::build(),
             Self::Chrome => chrome::build(),
+            Self::Plate => plate::build(),
+            Self::Knot => knot::build(),
         }
     }
 
@@ -107,6 +120,8 @@ impl Scene {
             Self::Wreath => wreath::finishes(),
             Self::Mug => mug::finishes(),
             Self::Chrome => chrome::finishes(),
+            Self::Plate => plate::finishes(),
+            Self::Knot => knot::finishes(),
         }
     }
 
@@ -119,6 +134,8 @@ impl Scene {
             Self::Wreath => 60.0,
             Self::Mug => 60.0,
             Self::Chrome => 60.0,
+            Self::Plate => 50.0,
+            Self::Knot => 80.0,
         }
     }
 
@@ -160,6 +177,8 @@ impl Paint {
             Self::Scene(Scene::Wreath) => wreath::albedo(p, part),
             Self::Scene(Scene::Mug) => mug::albedo(p, part),
             Self::Scene(Scene::Chrome) => chrome::albedo(p, part),
+            Self::Scene(Scene::Plate) => plate::albedo(p, normal, part),
+            Self::Scene(Scene::Knot) => knot::albedo(p, part),
         }
     }
 }

@@ -2,7 +2,7 @@
 //! floor few views see.
 
 use crate::material::{Finish, Vec3};
-use crate::shape::{Hole, MeshBuilder, P, curve};
+use crate::shape::{Hole, MeshBuilder, P, ear};
 use crate::texture_field::{blend, color, noise, step, stripe, wrap};
 
 const OUTSIDE: u8 = 0;
@@ -36,7 +36,8 @@ pub(crate) fn build() -> MeshBuilder {
         [rim[0] - half + half * c, rim[1] + half * s]
     }));
     let inner = profile.len();
-    profile.extend((1..=36).map(|k| [rim[0] - THICKNESS - 0.0012 * f64::from(k) / 36.0, rim[1] - 0.0022 * f64::from(k)]));
+    profile
+        .extend((1..=36).map(|k| [rim[0] - THICKNESS - 0.0012 * f64::from(k) / 36.0, rim[1] - 0.0022 * f64::from(k)]));
     let floor = profile[profile.len() - 1];
     profile.extend((1..=10).map(|k| {
         let (s, c) = (std::f64::consts::FRAC_PI_2 * f64::from(k) / 10.0).sin_cos();
@@ -52,7 +53,8 @@ pub(crate) fn build() -> MeshBuilder {
     b.loft(&rings[..foot]);
     b.part = OUTSIDE;
     let low = [wall + 7, wall + 30].map(|row| Hole { low: [row, HANDLE_COLUMN - 5], size: [6, 10] });
-    let edges = b.loft_around(&rings[foot - 1..=inner], &low.map(|h| Hole { low: [h.low[0] - foot + 1, h.low[1]], ..h }));
+    let edges =
+        b.loft_around(&rings[foot - 1..=inner], &low.map(|h| Hole { low: [h.low[0] - foot + 1, h.low[1]], ..h }));
     b.part = INSIDE;
     b.loft(&rings[inner..]);
     b.part = FOOT;
@@ -69,21 +71,10 @@ fn handle(b: &mut MeshBuilder, edges: &[Vec<u32>], [low, high]: [f64; 2]) {
     b.part = HANDLE;
     let turn = std::f64::consts::TAU * HANDLE_COLUMN as f64 / AROUND as f64;
     let out = P::new(turn.cos(), turn.sin(), 0.0);
-    let at = |r: f64, z: f64| out * r + P::z() * z;
-    let middle = 0.5 * (low + high);
-    let reach = RADIUS + 0.0285;
-    let [top, bottom] = [(high, 1.0), (low, -1.0)].map(|(z, sign)| {
-        let points = [
-            at(RADIUS - 0.0004, z),
-            at(RADIUS + 0.008, z + 0.0016 * sign),
-            at(RADIUS + 0.0195, z - 0.0010 * sign),
-            at(reach, middle + (z - middle) * 0.52),
-            at(reach + 0.0006, middle + sign * 0.0014),
-        ];
-        curve(&points, 8)
-    });
+    let foot = |z: f64| out * RADIUS + P::z() * z;
+    let [bottom, top] = ear(foot(low), foot(high), out * 0.030 - P::z() * 0.002, 30);
     let across = P::z().cross(&out);
-    let half = |_: usize| [0.0075, 0.0046];
+    let half = |_: usize| [0.0072, 0.0043];
     let upper = b.sleeve(&edges[1], &top, across, 10, half);
     let lower = b.sleeve(&edges[0], &bottom, across, 10, half);
     b.join(&upper, &lower);
@@ -96,7 +87,7 @@ pub(crate) fn finishes() -> Vec<Finish> {
 
 /// Cream glaze with iron specks; sea, boats and gulls around the outside.
 pub(crate) fn albedo(p: Vec3, part: u8) -> Vec3 {
-    let speck = step(0.80, 0.06, noise(p * 620.0, 3)) * 0.55;
+    let speck = step(0.9, 0.06, noise(p * 780.0, 3)) * 0.55;
     let cream = blend(color([242, 232, 210]), color([150, 112, 74]), speck);
     match part {
         FOOT => blend(color([190, 148, 108]), color([160, 120, 84]), noise(p * 700.0, 5)),
@@ -127,7 +118,9 @@ fn seascape(p: Vec3, cream: Vec3) -> Vec3 {
 
 fn gulls(under: Vec3, around: f32, z: f32) -> Vec3 {
     let mut c = under;
-    for (at, height, size) in [(-0.019, 0.075, 0.0050), (-0.030, 0.066, 0.0038), (0.045, 0.078, 0.0042), (0.062, 0.070, 0.0034)] {
+    for (at, height, size) in
+        [(-0.019, 0.075, 0.0050), (-0.030, 0.066, 0.0038), (0.045, 0.078, 0.0042), (0.062, 0.070, 0.0034)]
+    {
         let x = (around - at) / size;
         let wing = 0.55 * x.abs().min(1.0).sqrt() - 0.35 * x * x;
         let line = stripe((z - height) / size - wing, 0.085, 0.05) * stripe(x, 1.0, 0.1);
