@@ -7,7 +7,7 @@ use crate::shape::{MeshBuilder, P, across};
 use crate::texture_field::{blend, color, noise};
 use std::f64::consts::TAU;
 
-/// Yarns of a strand, each a part; the last two are coloured.
+/// Yarns of a strand, each a part; two of them are coloured.
 const YARNS: usize = 8;
 /// Points across a yarn, and around a strand.
 const ACROSS: usize = 5;
@@ -20,11 +20,11 @@ const SCALE: f64 = 0.0265;
 const DEPTH: f64 = 0.74;
 /// From the rope's axis to a strand's, and the strand's radii outward and across.
 const OFFSET: f64 = 0.0084;
-const RADII: [f64; 2] = [0.0068, 0.0061];
+const RADII: [f64; 2] = [0.0067, 0.0057];
 /// Turns of the lay in one lap, a third beyond a whole number.
-const LAY: f64 = 7.0 + 1.0 / 3.0;
+const LAY: f64 = 9.0 + 1.0 / 3.0;
 /// Turns of the yarns in a strand per lap, against the lay; whole over all laps.
-const TWIST: f64 = -14.0;
+const TWIST: f64 = -31.0;
 
 /// Builds the mesh.
 pub(crate) fn build() -> MeshBuilder {
@@ -97,9 +97,29 @@ pub(crate) fn finishes() -> Vec<Finish> {
 pub(crate) fn albedo(p: Vec3, part: u8) -> Vec3 {
     let fibre = noise(p * 1100.0, 3);
     let (light, dark) = match usize::from(part) {
-        k if k + 1 == YARNS => ([188, 44, 40], [132, 22, 26]),
-        k if k + 2 == YARNS => ([48, 84, 148], [26, 50, 104]),
+        2 => ([188, 44, 40], [132, 22, 26]),
+        6 => ([48, 84, 148], [26, 50, 104]),
         _ => ([226, 202, 158], [176, 142, 98]),
     };
     blend(color(light), color(dark), fibre * fibre) * (0.9 + 0.1 * noise(p * 240.0, 5))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_rope_passes_itself_without_touching() {
+        let points: Vec<P> = (0..720).map(|k| axis(TAU * f64::from(k) / 720.0)).collect();
+        let (mut nearest, apart) = (f64::INFINITY, 90);
+        for (i, p) in points.iter().enumerate() {
+            for (j, q) in points.iter().enumerate() {
+                let laps = i.abs_diff(j).min(720 - i.abs_diff(j));
+                if laps > apart {
+                    nearest = nearest.min((p - q).norm());
+                }
+            }
+        }
+        assert!(nearest > 2.0 * (OFFSET + RADII[0] * 1.02), "{nearest}");
+    }
 }

@@ -1,12 +1,17 @@
 //! The objects. To add one: a file with `build`, `albedo` and `finishes`, and a variant in [`Scene`];
 //! the compiler lists the rest. `docs/synthetic-scenes.md` is the catalogue.
 
+mod blank;
 mod chance;
 mod chrome;
+mod clay;
 mod elephant;
+mod glass;
 mod house;
+mod jade;
 mod knot;
 mod mug;
+mod noise;
 mod plate;
 mod temple;
 mod wreath;
@@ -38,6 +43,14 @@ pub enum Scene {
     Plate,
     /// A trefoil knot of three-stranded rope.
     Knot,
+    /// A die printed at the limit of what a camera resolves.
+    Noise,
+    /// A wine glass of clear crystal with a cut bowl.
+    Glass,
+    /// A rabbit of plain white plaster.
+    Blank,
+    /// A carved turtle of pale green jade.
+    Jade,
 }
 
 /// How a scene is coloured.
@@ -61,8 +74,20 @@ pub(crate) struct Built {
 
 impl Scene {
     /// Every scene, in the order of a listing.
-    pub const ALL: [Self; 8] =
-        [Self::Temple, Self::Elephant, Self::House, Self::Wreath, Self::Mug, Self::Chrome, Self::Plate, Self::Knot];
+    pub const ALL: [Self; 12] = [
+        Self::Temple,
+        Self::Elephant,
+        Self::House,
+        Self::Wreath,
+        Self::Mug,
+        Self::Chrome,
+        Self::Plate,
+        Self::Knot,
+        Self::Noise,
+        Self::Glass,
+        Self::Blank,
+        Self::Jade,
+    ];
 
     /// The name on the command line.
     pub fn name(self) -> &'static str {
@@ -75,6 +100,10 @@ impl Scene {
             Self::Chrome => "chrome",
             Self::Plate => "plate",
             Self::Knot => "knot",
+            Self::Noise => "noise",
+            Self::Glass => "glass",
+            Self::Blank => "blank",
+            Self::Jade => "jade",
         }
     }
 
@@ -89,6 +118,10 @@ impl Scene {
             Self::Chrome => "a silvered teapot: a mirror with a spout and a handle",
             Self::Plate => "a thin Delft plate with a windmill, leaning on a stand",
             Self::Knot => "a trefoil knot of rope that hides itself",
+            Self::Noise => "a die printed with checks, noise and gratings at the sampling limit",
+            Self::Glass => "a wine glass of clear crystal, seen through itself",
+            Self::Blank => "a rabbit of plain white plaster, without texture",
+            Self::Jade => "a carved jade turtle that light walks through",
         }
     }
 
@@ -108,6 +141,10 @@ impl Scene {
             Self::Chrome => chrome::build(),
             Self::Plate => plate::build(),
             Self::Knot => knot::build(),
+            Self::Noise => noise::build(),
+            Self::Glass => glass::build(),
+            Self::Blank => blank::build(),
+            Self::Jade => jade::build(),
         }
     }
 
@@ -122,6 +159,10 @@ impl Scene {
             Self::Chrome => chrome::finishes(),
             Self::Plate => plate::finishes(),
             Self::Knot => knot::finishes(),
+            Self::Noise => noise::finishes(),
+            Self::Glass => glass::finishes(),
+            Self::Blank => blank::finishes(),
+            Self::Jade => jade::finishes(),
         }
     }
 
@@ -136,6 +177,10 @@ impl Scene {
             Self::Chrome => 60.0,
             Self::Plate => 50.0,
             Self::Knot => 80.0,
+            Self::Noise => 40.0,
+            Self::Glass => 30.0,
+            Self::Blank => 60.0,
+            Self::Jade => 60.0,
         }
     }
 
@@ -179,6 +224,10 @@ impl Paint {
             Self::Scene(Scene::Chrome) => chrome::albedo(p, part),
             Self::Scene(Scene::Plate) => plate::albedo(p, normal, part),
             Self::Scene(Scene::Knot) => knot::albedo(p, part),
+            Self::Scene(Scene::Noise) => noise::albedo(p, part),
+            Self::Scene(Scene::Glass) => glass::albedo(),
+            Self::Scene(Scene::Blank) => blank::albedo(),
+            Self::Scene(Scene::Jade) => jade::albedo(p),
         }
     }
 }
