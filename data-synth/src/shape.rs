@@ -69,6 +69,24 @@ impl MeshBuilder {
         self.ring([[-x, -y, z], [x, -y, z], [x, y, z], [-x, y, z]])
     }
 
+    /// Moves the mesh up or down until its lowest point is on the table.
+    pub(crate) fn set_down(self) -> Self {
+        let bottom = self.mesh.positions.iter().fold(f64::INFINITY, |m, p| m.min(p.z));
+        self.moved(|p| p - P::z() * bottom)
+    }
+
+    /// Drops vertices of no face, as lie within what was left open.
+    pub(crate) fn without_strays(mut self) -> Self {
+        let mut is_used = vec![false; self.mesh.positions.len()];
+        self.mesh.faces.as_flattened().iter().for_each(|&v| is_used[v as usize] = true);
+        let mut next = 0;
+        let place: Vec<u32> = is_used.iter().map(|&used| (next, next += u32::from(used)).0).collect();
+        self.mesh.faces.as_flattened_mut().iter_mut().for_each(|v| *v = place[*v as usize]);
+        let mut used = is_used.iter();
+        self.mesh.positions.retain(|_| used.next() == Some(&true));
+        self
+    }
+
     /// The same faces with every vertex moved.
     pub(crate) fn moved(mut self, place: impl Fn(P) -> P) -> Self {
         for p in &mut self.mesh.positions {
@@ -446,9 +464,9 @@ pub(crate) fn corner_normals(mesh: &Mesh, crease_rad: f64) -> Vec<[Vector3<f32>;
 pub(crate) fn sphere(radius: f64, n: usize) -> Mesh {
     let mut b = MeshBuilder::default();
     let circle = |k: usize| {
-        let (s, c) = (std::f64::consts::PI * k as f64 / n as f64).sin_cos();
+        let (s, c) = (PI * k as f64 / n as f64).sin_cos();
         (0..2 * n).map(move |i| {
-            let (sp, cp) = (std::f64::consts::PI * i as f64 / n as f64).sin_cos();
+            let (sp, cp) = (PI * i as f64 / n as f64).sin_cos();
             [radius * s * cp, radius * s * sp, -radius * c]
         })
     };
@@ -488,13 +506,13 @@ mod tests {
         let mut b = MeshBuilder::default();
         let outer = b.rectangle([2.0, 3.0], 0.0);
         let circle = |i| {
-            let (s, c) = (std::f64::consts::TAU * f64::from(i) / 48.0).sin_cos();
+            let (s, c) = (TAU * f64::from(i) / 48.0).sin_cos();
             [1.5 * c, 1.5 * s, 0.0]
         };
         let inner = b.ring((0..48).map(circle));
         b.annulus(&outer, &inner);
         let areas: Vec<f64> = (0..b.mesh.faces.len()).map(|f| b.mesh.face_area_vector(f).z / 2.0).collect();
-        let expected = 24.0 - 0.5 * 48.0 * 2.25 * (std::f64::consts::TAU / 48.0).sin();
+        let expected = 24.0 - 0.5 * 48.0 * 2.25 * (TAU / 48.0).sin();
         assert!(areas.iter().all(|&a| a > 0.0));
         assert!((areas.iter().sum::<f64>() - expected).abs() < 1e-5);
     }
@@ -503,6 +521,6 @@ mod tests {
     fn the_sphere_is_closed_and_faces_outward() {
         let mesh = sphere(1.0, 48);
         assert!(is_closed(&mesh));
-        assert!((mesh.signed_volume() / (4.0 / 3.0 * std::f64::consts::PI) - 1.0).abs() < 0.01);
+        assert!((mesh.signed_volume() / (4.0 / 3.0 * PI) - 1.0).abs() < 0.01);
     }
 }

@@ -76,7 +76,7 @@ pub(crate) fn build() -> MeshBuilder {
     b.fan(&rings[rings.len() - 1], top);
     b.part = METAL;
     b.fan_reversed(&rings[0], P::z() * body[0][1]);
-    b
+    b.without_strays().set_down()
 }
 
 fn spout(b: &mut MeshBuilder, edge: &[u32]) {

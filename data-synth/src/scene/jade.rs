@@ -53,9 +53,11 @@ fn head(q: P) -> f64 {
     let beak = ellipsoid(q, at(0.80, 0.0, 0.325), at(0.075, 0.062, 0.056));
     let head = smooth_min(smooth_min(neck, skull, 0.04), beak, 0.04);
     // The mouth is a groove; folds around the neck.
-    let mouth = ((q.z - 0.298 - 0.25 * (q.x - 0.8).powi(2)).abs() - 0.004).max(0.70 - q.x);
+    let mouth = ((q.z - 0.298 - 0.25 * (q.x - 0.8).powi(2)).abs() - 0.007).max(0.70 - q.x);
     let folds = 0.006 * (85.0 * (q.x + 0.6 * q.z)).sin() * (1.0 - ((q.x - 0.54).abs() / 0.10).min(1.0));
-    let head = smooth_max(head + folds, -mouth, 0.012);
+    let head = head + folds;
+    // Cut no deeper than a groove.
+    let head = smooth_max(head, -mouth.max(-0.014 - head), 0.01);
     // A round eye under a lid.
     let eye = ellipsoid(q, at(0.752, 0.078, 0.368), at(0.030, 0.028, 0.027));
     let lid = ellipsoid(q, at(0.740, 0.078, 0.384), at(0.044, 0.036, 0.022));

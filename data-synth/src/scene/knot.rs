@@ -17,7 +17,7 @@ const LAPS: usize = 3;
 const RINGS: usize = 860;
 /// Metres per unit of the curve, and its thickness along the axis of symmetry in units.
 const SCALE: f64 = 0.0265;
-const DEPTH: f64 = 0.74;
+const DEPTH: f64 = 1.0;
 /// From the rope's axis to a strand's, and the strand's radii outward and across.
 const OFFSET: f64 = 0.0084;
 const RADII: [f64; 2] = [0.0067, 0.0057];
@@ -54,8 +54,7 @@ pub(crate) fn build() -> MeshBuilder {
             b.face([pair[0][i], pair[1][j], pair[1][i]]);
         }
     }
-    let bottom = b.mesh.positions.iter().fold(f64::INFINITY, |m, p| m.min(p.z));
-    b.moved(|p| p - P::z() * bottom)
+    b.set_down()
 }
 
 /// The rope's axis at `t`, standing upright on two of its three loops.
@@ -121,5 +120,24 @@ mod tests {
             }
         }
         assert!(nearest > 2.0 * (OFFSET + RADII[0] * 1.02), "{nearest}");
+    }
+
+    #[test]
+    fn no_strand_runs_into_its_neighbours() {
+        for k in (0..LAPS * RINGS).step_by(61) {
+            let t = TAU * k as f64 / RINGS as f64;
+            let [u, v] = section(t);
+            for i in 0..24 {
+                let (s, c) = (TAU * f64::from(i) / 24.0).sin_cos();
+                let p = strand(t) + (u * (RADII[0] * c) + v * (RADII[1] * s)) * 1.02;
+                for lap in [TAU, 2.0 * TAU] {
+                    let near = (-60..=60).map(|j| t + lap + f64::from(j) * 0.002);
+                    let near = near.min_by(|a, b| (strand(*a) - p).norm().total_cmp(&(strand(*b) - p).norm())).unwrap();
+                    let ([a, b], r) = (section(near), p - strand(near));
+                    let inside = (a.dot(&r) / RADII[0]).hypot(b.dot(&r) / RADII[1]);
+                    assert!(inside > 1.02, "{inside} at {t}");
+                }
+            }
+        }
     }
 }

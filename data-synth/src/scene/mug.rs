@@ -63,7 +63,7 @@ pub(crate) fn build() -> MeshBuilder {
     b.part = INSIDE;
     b.fan(&rings[rings.len() - 1], P::z() * last[1]);
     handle(&mut b, &edges, low.map(|h| 0.5 * (profile[h.low[0]][1] + profile[h.low[0] + 6][1])));
-    b
+    b.without_strays()
 }
 
 /// An ear between the two holes, flatter than wide.
@@ -106,7 +106,8 @@ fn seascape(p: Vec3, cream: Vec3) -> Vec3 {
     // Sun to the right of the first boat, with rays.
     let (dx, dz) = (wrap(around - 0.023, 0.2576), z - 0.071);
     let far = dx.hypot(dz);
-    let rays = stripe(wrap(dz.atan2(dx), 0.5236), 0.10, 0.05) * stripe(far - 0.0105, 0.0018, 0.0005);
+    let rays =
+        stripe(wrap(dz.atan2(dx), std::f32::consts::FRAC_PI_6), 0.10, 0.05) * stripe(far - 0.0105, 0.0018, 0.0005);
     c = blend(c, color([240, 168, 40]), (1.0 - step(0.0072, 0.0005, far)).max(rays));
     c = gulls(c, around, z);
     // Three boats of two kinds around the mug.

@@ -37,8 +37,7 @@ pub(crate) fn build() -> MeshBuilder {
     twine(&mut b);
     garland(&mut b, &mut chance);
     bow(&mut b);
-    let bottom = b.mesh.positions.iter().fold(f64::INFINITY, |m, p| m.min(p.z));
-    b.moved(|p| p - P::z() * bottom)
+    b.set_down()
 }
 
 /// What the parts are made of: straw has a sheen, ribbon is satin, petals are dull.
