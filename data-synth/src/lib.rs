@@ -4,20 +4,23 @@
 //! pictures, mattes, exact cameras and the true surface; [`SynthCapture::write`] saves them as a
 //! capture folder. Everything is a function of scene, options and seed, whatever the thread count.
 //!
+//! [`hull_truth`] knows the visual hulls of simple solids without carving them.
+//!
 //! This crate shares no shading code with `render` and knows no appearance: truth must not lean on
 //! what it judges.
 //!
-//! State: two scenes; sensor noise only; no depth or normal maps, no video, no BTFs yet. A feature
-//! thinner than half a pixel can be missed by the matte. Paths end after
-//! [`SynthOptions::surfaces`] surfaces, so deep cavities are slightly dark.
+//! Limits: light is sampled at three wavelengths, without polarisation or dispersion; a matte misses what is
+//! thinner than half a pixel and shorter than one.
 
 mod accel;
 mod error;
+mod faults;
 mod film;
+pub mod hull_truth;
 mod isosurface;
 mod light;
 mod material;
-mod noise;
+mod medium;
 mod sampler;
 mod scene;
 mod shape;
@@ -28,7 +31,10 @@ mod turntable;
 mod write;
 
 pub use error::SynthError;
-pub use noise::SensorNoise;
+pub use faults::{Faults, SensorNoise};
+pub use film::Effort;
 pub use scene::Scene;
-pub use synth::{LightFrame, SynthCapture, SynthOptions, SynthReport, synthesize, synthesize_with};
+pub use synth::{
+    LightFrame, SynthCapture, SynthOptions, SynthReport, TruthMaps, ViewTruth, synthesize, synthesize_with,
+};
 pub use turntable::Layout;

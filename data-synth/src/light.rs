@@ -1,9 +1,9 @@
-//! What shines on the object: a sky that changes with height, and flat area lights.
+//! What shines on the object: a sky that changes with height, and area lights.
 //!
 //! Lights are given in the room, whose +x points at the camera; turning the room about z by the
 //! camera's azimuth is what a turntable does to the light seen from the object.
 
-use crate::material::{Vec3, concentric_disk};
+use crate::material::{Vec3, concentric_disk, frame_around};
 use std::f32::consts::PI;
 
 /// Outline of an area light.
@@ -13,9 +13,11 @@ pub(crate) enum LightShape {
     Disk,
     /// A rectangle with the two half sides.
     Rectangle,
+    /// A ball whose radius is the length of the first half axis; it shines all around.
+    Sphere,
 }
 
-/// A flat light shining to one side.
+/// A light: flat and shining to one side, or a ball.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct AreaLight {
     /// Outline.
@@ -69,14 +71,15 @@ impl AreaLight {
         Self { shape, center, half_axes: [side * half[0], w.cross(&side) * half[1]], radiance }
     }
 
+    /// The normal, as long as the area; of a ball, its cross-section's, towards where `facing` turned it.
     fn normal_area(&self) -> Vec3 {
-        let factor = if self.shape == LightShape::Disk { PI } else { 4.0 };
+        let factor = if self.shape == LightShape::Rectangle { 4.0 } else { PI };
         self.half_axes[0].cross(&self.half_axes[1]) * factor
     }
 
     fn point(&self, u: [f32; 2]) -> Vec3 {
         let [a, b] = match self.shape {
-            LightShape::Disk => concentric_disk(u),
+            LightShape::Disk | LightShape::Sphere => concentric_disk(u),
             LightShape::Rectangle => [2.0 * u[0] - 1.0, 2.0 * u[1] - 1.0],
         };
         self.center + self.half_axes[0] * a + self.half_axes[1] * b
@@ -84,6 +87,9 @@ impl AreaLight {
 
     /// Distance along a ray to the shining side.
     fn intersect(&self, origin: Vec3, direction: Vec3) -> Option<f32> {
+        if self.shape == LightShape::Sphere {
+            return self.intersect_ball(origin, direction);
+        }
         let n = self.half_axes[0].cross(&self.half_axes[1]);
         let facing = -direction.dot(&n);
         if facing <= 0.0 {
@@ -96,14 +102,48 @@ impl AreaLight {
         let p = origin + direction * t - self.center;
         let [a, b] = self.half_axes.map(|axis| p.dot(&axis) / axis.norm_squared());
         let inside = match self.shape {
-            LightShape::Disk => a * a + b * b <= 1.0,
+            LightShape::Disk | LightShape::Sphere => a * a + b * b <= 1.0,
             LightShape::Rectangle => a.abs() <= 1.0 && b.abs() <= 1.0,
         };
         inside.then_some(t)
     }
 
+    fn intersect_ball(&self, origin: Vec3, direction: Vec3) -> Option<f32> {
+        let to_center = self.center - origin;
+        let along = to_center.dot(&direction);
+        let half2 = self.half_axes[0].norm_squared() - (to_center - direction * along).norm_squared();
+        (half2 >= 0.0).then(|| along - half2.sqrt()).filter(|&t| t > 0.0)
+    }
+
+    /// `1 − cos` of the half angle under which a ball is seen; none from inside.
+    fn cone(&self, point: Vec3) -> Option<f32> {
+        let sin2 = self.half_axes[0].norm_squared() / (self.center - point).norm_squared();
+        // 1 − √(1 − s²) without cancellation.
+        (sin2 < 1.0).then(|| sin2 / (1.0 + (1.0 - sin2).sqrt()))
+    }
+
+    /// A direction of the cone under which a ball is seen, all alike.
+    fn sample_ball(&self, point: Vec3, u: [f32; 2]) -> Option<LightSample> {
+        let one_minus_cos = self.cone(point)? * u[0];
+        let cos = 1.0 - one_minus_cos;
+        let sin = (one_minus_cos * (1.0 + cos)).sqrt();
+        let [x, y, z] = frame_around((self.center - point).normalize());
+        let (s, c) = (2.0 * PI * u[1]).sin_cos();
+        let direction = (x * (sin * c) + y * (sin * s) + z * cos).normalize();
+        // At the very rim rounding may miss; the distance to the middle then serves as well.
+        let distance = self.intersect_ball(point, direction).unwrap_or((self.center - point).norm());
+        Some(LightSample { direction, distance, radiance: self.radiance, pdf: self.pdf_ball(point)? })
+    }
+
+    fn pdf_ball(&self, point: Vec3) -> Option<f32> {
+        Some(1.0 / (2.0 * PI * self.cone(point)?))
+    }
+
     /// Draws a point on the light; `None` where it shines away.
     pub(crate) fn sample(&self, point: Vec3, u: [f32; 2]) -> Option<LightSample> {
+        if self.shape == LightShape::Sphere {
+            return self.sample_ball(point, u);
+        }
         let to_light = self.point(u) - point;
         let distance = to_light.norm();
         let direction = to_light / distance;
@@ -115,6 +155,15 @@ impl AreaLight {
     fn pdf(&self, direction: Vec3, distance: f32) -> f32 {
         let facing = -direction.dot(&self.normal_area());
         if facing <= 0.0 { 0.0 } else { distance * distance / facing }
+    }
+
+    /// How much the light might give at a point, for picking one of several: never zero, for a part of it
+    /// may shine where its middle does not.
+    pub(crate) fn share(&self, point: Vec3, normal: Vec3) -> f32 {
+        let to_light = self.center - point;
+        let d2 = to_light.norm_squared().max(f32::MIN_POSITIVE);
+        let cos = normal.dot(&to_light) / d2.sqrt();
+        self.radiance.max() * self.normal_area().norm() / d2 * (0.1 + 0.9 * cos.max(0.0))
     }
 
     fn turned(&self, yaw: f32) -> Self {
@@ -167,12 +216,18 @@ impl LightRig {
         Self { sky: self.sky, lights: self.lights.iter().map(|l| l.turned(yaw)).collect() }
     }
 
-    /// The nearest light a ray meets within `limit`, with the density [`AreaLight::sample`] gives it.
-    pub(crate) fn hit(&self, point: Vec3, direction: Vec3, limit: f32) -> Option<LightSample> {
+    /// The nearest light a ray meets within `limit`, with the density [`AreaLight::sample`] gives it, and
+    /// its index.
+    pub(crate) fn hit(&self, point: Vec3, direction: Vec3, limit: f32) -> Option<(LightSample, usize)> {
         let reach = |light: &AreaLight| light.intersect(point, direction).filter(|&t| t < limit);
-        let met = self.lights.iter().filter_map(|light| Some((light, reach(light)?)));
-        let (light, distance) = met.min_by(|a, b| a.1.total_cmp(&b.1))?;
-        Some(LightSample { direction, distance, radiance: light.radiance, pdf: light.pdf(direction, distance) })
+        let met = self.lights.iter().enumerate().filter_map(|(i, light)| Some((i, reach(light)?)));
+        let (index, distance) = met.min_by(|a, b| a.1.total_cmp(&b.1))?;
+        let light = &self.lights[index];
+        let pdf = match light.shape {
+            LightShape::Sphere => light.pdf_ball(point)?,
+            _ => light.pdf(direction, distance),
+        };
+        Some((LightSample { direction, distance, radiance: light.radiance, pdf }, index))
     }
 }
 
@@ -200,7 +255,7 @@ mod tests {
             let u = [i, i + 500].map(|k| 0.02 + 0.96 * crate::sampler::unit(crate::sampler::mix(k)));
             for light in &rig.lights {
                 let s = light.sample(p, u).unwrap();
-                let h = rig.hit(p, s.direction, f32::INFINITY).unwrap();
+                let (h, _) = rig.hit(p, s.direction, f32::INFINITY).unwrap();
                 assert!((s.pdf / h.pdf - 1.0).abs() < 1e-3, "{} against {}", s.pdf, h.pdf);
             }
         }

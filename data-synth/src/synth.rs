@@ -1,13 +1,13 @@
 //! From a scene and options to a capture in memory.
 
 use crate::error::SynthError;
-use crate::film::{Exposure, expose};
+use crate::faults::Faults;
+use crate::film::{Effort, Exposure, Picture, expose};
 use crate::light::LightRig;
-use crate::noise::SensorNoise;
 use crate::scene::Scene;
 use crate::trace::PathLimits;
 use crate::turntable::{Layout, Station, cameras, room_yaw, stations};
-use capture::{Aabb, Camera, View};
+use capture::{Aabb, Camera, Image, View};
 use geometry::Mesh;
 use nalgebra::Vector3;
 
@@ -31,16 +31,18 @@ pub struct SynthOptions {
     pub height: usize,
     /// Of everything random; the same seed gives the same bytes.
     pub seed: u64,
-    /// Paths per pixel, 1 to 65536; powers of two are stratified best.
-    pub samples_per_pixel: u32,
-    /// Surfaces a path of light may touch, 1 to 16; 1 is direct light only.
+    /// Paths per pixel, or the noise to reach.
+    pub effort: Effort,
+    /// Surfaces a path of light may touch, 1 to 1000; 1 is direct light only.
     pub surfaces: usize,
     /// What the light is fixed to.
     pub light: LightFrame,
     /// Where the cameras stand.
     pub layout: Layout,
-    /// Sensor noise, none for ideal pictures.
-    pub sensor_noise: Option<SensorNoise>,
+    /// What goes wrong, nothing for ideal pictures.
+    pub faults: Faults,
+    /// Keep depth, normals, radiance and noise of every view, for [`SynthCapture::truths`].
+    pub maps: bool,
 }
 
 /// Pictures whose truth is known.
@@ -48,8 +50,10 @@ pub struct SynthOptions {
 pub struct SynthCapture {
     /// What was filmed.
     pub scene: Scene,
-    /// Pictures, mattes and exact cameras.
+    /// Pictures, mattes and cameras: exact, unless [`SynthOptions::faults`] says otherwise.
     pub views: Vec<View>,
+    /// What the views do not show, one per view.
+    pub truths: Vec<ViewTruth>,
     /// Unit direction from the object to the key light, one per view.
     pub light_directions: Vec<Vector3<f64>>,
     /// The true surface.
@@ -60,13 +64,40 @@ pub struct SynthCapture {
     pub report: SynthReport,
 }
 
+/// What is true of a view, whatever faults its picture has.
+#[derive(Clone, Debug)]
+pub struct ViewTruth {
+    /// The camera that took it.
+    pub camera: Camera,
+    /// Factor on the light, 1 without drift.
+    pub exposure: f64,
+    /// By pixel, where asked for.
+    pub maps: Option<TruthMaps>,
+}
+
+/// The ideal picture and what it shows, by pixel.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TruthMaps {
+    /// Mean radiance, object on black, linear RGB, white at 1.
+    pub radiance: Image<[f32; 3]>,
+    /// Share of the pixel the object covers, 0 to 1.
+    pub coverage: Image<f32>,
+    /// Standard error of the picture, in levels of 255 of sRGB, root mean square over channels.
+    pub noise: Image<f32>,
+    /// Distance along the optical axis of what the ray through the pixel's centre meets, in metres;
+    /// infinite where it meets nothing. What is not infinite is visible in this view.
+    pub depth: Image<f32>,
+    /// Unit shading normal there, in the world; zero where there is nothing.
+    pub normal: Image<[f32; 3]>,
+}
+
 /// Cost and noise of a synthetic capture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SynthReport {
     /// Rays of every kind.
     pub rays: u64,
     /// Root mean square over object pixels and channels of the renderer's own noise, in levels of
-    /// 255 of sRGB, from the difference of two halves of the samples (which errs high: a half is
+    /// 255 of sRGB, from how much four parts of the samples differ (which errs high: a part is
     /// stratified less finely than the whole). `None` at one sample per pixel.
     pub noise_rms: Option<f64>,
 }
@@ -79,11 +110,12 @@ impl Default for SynthOptions {
             width: 480,
             height: 360,
             seed: 0,
-            samples_per_pixel: 8,
-            surfaces: 2,
+            effort: Effort::Samples(8),
+            surfaces: 100,
             light: LightFrame::Room,
             layout: Layout::Rings { elevations_deg: vec![12.0, 35.0] },
-            sensor_noise: None,
+            faults: Faults::default(),
+            maps: false,
         }
     }
 }
@@ -98,9 +130,16 @@ impl SynthOptions {
         within("views", self.views as u64, 10_000)?;
         within("width", self.width as u64, 16_384)?;
         within("height", self.height as u64, 16_384)?;
-        within("samples_per_pixel", u64::from(self.samples_per_pixel), 65_536)?;
-        within("surfaces", self.surfaces as u64, 16)?;
-        self.sensor_noise.map_or(Ok(()), |n| n.check())
+        match self.effort {
+            Effort::Samples(n) => within("samples", u64::from(n), 65_536)?,
+            Effort::Noise(levels) if (0.05..=64.0).contains(&levels) => {}
+            Effort::Noise(levels) => {
+                let allowed = "between 0.05 and 64 levels of 255".to_owned();
+                return Err(SynthError::Option { option: "noise", value: levels.to_string(), allowed });
+            }
+        }
+        within("surfaces", self.surfaces as u64, 1000)?;
+        self.faults.check()
     }
 }
 
@@ -127,55 +166,68 @@ pub fn synthesize_with(
     let aabb = built.mesh.aabb().ok_or(SynthError::Scene { fault: "it has no vertices" })?;
     let cameras = cameras(&stations, &built.mesh, &aabb, [options.width, options.height]);
     let rig = LightRig::studio(aabb.center().coords.cast(), 0.5 * aabb.diagonal() as f32);
-    // White: what a second surface adds can then not stand out of its neighbours as a speckle.
-    let limits = PathLimits { surfaces: options.surfaces, clamp: 1.0 };
-    let mut film = Film { views: Vec::new(), light_directions: Vec::new(), rays: 0, noise: (0.0, 0) };
+    let shutter_rad = options.faults.motion_blur_deg.to_radians();
+    let limits = PathLimits { surfaces: options.surfaces };
+    let mut film = Film::new(options, &aabb);
     for (view, (station, camera)) in stations.iter().zip(&cameras).enumerate() {
-        let rig = rig_for(&rig, options.light, station);
-        let samples = options.samples_per_pixel;
-        let exposure = Exposure { world: &built.world, rig: &rig, limits, samples, seed: options.seed, view };
-        film.add(camera, &exposure, options.sensor_noise, &aabb);
+        let rig = &rig_for(&rig, options.light, station);
+        let (effort, seed) = (options.effort, options.seed);
+        film.take(camera, &Exposure { world: &built.world, rig, limits, effort, seed, view, shutter_rad });
         progress(view + 1, options.views);
     }
-    let noise_rms = (film.noise.1 > 0).then(|| (film.noise.0 / film.noise.1 as f64).sqrt());
-    let report = SynthReport { rays: film.rays, noise_rms };
-    Ok(SynthCapture {
-        scene,
-        views: film.views,
-        light_directions: film.light_directions,
-        mesh: built.mesh,
-        aabb,
-        report,
-    })
+    let Film { views, truths, light_directions, report, .. } = film;
+    Ok(SynthCapture { scene, views, truths, light_directions, mesh: built.mesh, aabb, report })
 }
 
 /// What has been filmed so far.
-struct Film {
+struct Film<'a> {
+    options: &'a SynthOptions,
+    target: Vector3<f64>,
     views: Vec<View>,
+    truths: Vec<ViewTruth>,
     light_directions: Vec<Vector3<f64>>,
-    rays: u64,
-    noise: (f64, u64),
+    report: SynthReport,
 }
 
-impl Film {
-    fn add(&mut self, camera: &Camera, exposure: &Exposure<'_>, sensor: Option<SensorNoise>, aabb: &Aabb) {
-        let mut picture = expose(camera, exposure);
-        if let Some(sensor) = sensor {
-            sensor.apply(&mut picture.image, exposure.seed, exposure.view);
-        }
-        let key = exposure.rig.lights.first().map(|l| l.center.cast::<f64>() - aabb.center().coords);
-        let key = key.and_then(|d| d.try_normalize(0.0));
+impl<'a> Film<'a> {
+    fn new(options: &'a SynthOptions, aabb: &Aabb) -> Self {
+        let report = SynthReport { rays: 0, noise_rms: None };
+        let target = aabb.center().coords;
+        Self { options, target, views: Vec::new(), truths: Vec::new(), light_directions: Vec::new(), report }
+    }
+
+    fn take(&mut self, camera: &Camera, exposure: &Exposure<'_>) {
+        let (faults, seed, view) = (&self.options.faults, exposure.seed, exposure.view);
+        let camera = faults.true_camera(camera, self.target, seed, view);
+        let picture = expose(&camera, exposure);
+        let key = exposure.rig.lights.first().and_then(|l| (l.center.cast() - self.target).try_normalize(0.0));
         self.light_directions.push(key.unwrap_or_else(Vector3::z));
-        self.rays += picture.rays;
-        self.noise = (self.noise.0 + picture.noise_squared, self.noise.1 + picture.noise_terms);
+        self.count(&picture);
         self.views.push(View {
-            index: exposure.view,
-            name: format!("{:04}", exposure.view),
-            image: picture.image,
-            matte: picture.matte,
+            index: view,
+            name: format!("{view:04}"),
+            image: faults.develop(&picture, seed, view),
+            matte: faults.cut(&picture.coverage, seed, view),
             is_complete: true,
-            camera: *camera,
+            camera: faults.believed_camera(&camera, seed, view),
         });
+        let maps = self.options.maps.then(|| TruthMaps::from(picture));
+        self.truths.push(ViewTruth { camera, exposure: faults.exposure(seed, view), maps });
+    }
+
+    /// Adds up rays, and noise as a mean of squares over views.
+    fn count(&mut self, picture: &Picture) {
+        self.report.rays += picture.rays;
+        let taken = self.views.len() as f64;
+        let before = self.report.noise_rms.map_or(0.0, |n| n * n * taken);
+        self.report.noise_rms = picture.noise_rms.map(|n| ((before + n * n) / (taken + 1.0)).sqrt());
+    }
+}
+
+impl From<Picture> for TruthMaps {
+    fn from(picture: Picture) -> Self {
+        let Picture { radiance, coverage, noise, depth, normal, .. } = picture;
+        Self { radiance, coverage, noise, depth, normal }
     }
 }
 
@@ -191,7 +243,7 @@ mod tests {
     use super::*;
 
     fn small() -> SynthOptions {
-        SynthOptions { views: 2, width: 48, height: 36, samples_per_pixel: 2, ..SynthOptions::default() }
+        SynthOptions { views: 2, width: 48, height: 36, effort: Effort::Samples(2), ..SynthOptions::default() }
     }
 
     #[test]
@@ -238,14 +290,12 @@ mod tests {
             (SynthOptions { views: 0, ..small() }, "views"),
             (SynthOptions { width: 0, ..small() }, "width"),
             (SynthOptions { height: 1 << 20, ..small() }, "height"),
-            (SynthOptions { samples_per_pixel: 0, ..small() }, "samples_per_pixel"),
+            (SynthOptions { effort: Effort::Samples(0), ..small() }, "samples"),
+            (SynthOptions { effort: Effort::Noise(f64::NAN), ..small() }, "noise"),
             (SynthOptions { surfaces: 0, ..small() }, "surfaces"),
             (
-                SynthOptions {
-                    sensor_noise: Some(SensorNoise { full_well: f64::NAN, read_electrons: 0.0 }),
-                    ..small()
-                },
-                "full_well",
+                SynthOptions { faults: Faults { distortion_k1: f64::NAN, ..Faults::default() }, ..small() },
+                "distortion_k1",
             ),
         ] {
             let error = synthesize(Scene::Temple, &bad).unwrap_err().to_string();

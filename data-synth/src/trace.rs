@@ -1,16 +1,28 @@
 //! A path tracer for one mesh under a light rig.
 //!
-//! At each surface point one shadow ray goes to every light (a choice among them is noisy wherever the
-//! key light is hidden) and one ray is scattered; the two ways of finding a light are combined by the power heuristic (Veach 1997, chapter 9). The sky is found by
-//! scattering alone: it is smooth. After [`PathLimits::surfaces`] surfaces a path ends, and what comes
-//! by way of a second surface is clamped ([`PathLimits::clamp`]): the only bias, against fireflies.
+//! At the first surface one shadow ray goes to every light (a choice among them is noisy wherever the key
+//! light is hidden), later to one light picked by what it might give; then one ray is scattered. The two
+//! ways of finding a light are combined by the power heuristic (Veach 1997, chapter 9). The sky is found
+//! by scattering alone: it is smooth. Paths end by Russian roulette on what they may still carry, so the
+//! mean is unbiased; [`PathLimits`] bounds them only where asked to.
 
 use crate::accel::{Accel, Hit};
 use crate::light::{LightRig, LightSample};
-use crate::material::{Finish, Scatter, Surface, Vec3};
+use crate::material::{
+    Coat, Finish, Lobes, Surface, Vec3, cosine_hemisphere, frame_around, fresnel_dielectric, reflect,
+};
+use crate::medium::{Medium, isotropic, scattering_albedo};
 use crate::sampler::Sampler;
 use crate::scene::Paint;
 use geometry::Mesh;
+
+/// Passages of glass a path may make: beyond, what is left is less than roulette would keep.
+const MAX_PASSAGES: usize = 64;
+/// Scatterings inside a body after which roulette begins, and after which a walk ends (one in 10⁵ in
+/// white marble; they end dark).
+const WALK: std::ops::Range<usize> = 16..1024;
+/// Most a path is likely to survive a surface by roulette.
+const SURVIVAL: f32 = 0.95;
 
 /// A scene made ready for tracing.
 #[derive(Debug)]
@@ -27,10 +39,8 @@ pub(crate) struct World {
 /// Where paths end.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct PathLimits {
-    /// Surfaces a path may touch: 1 is direct light only.
+    /// Surfaces a path may touch, glass apart: 1 is direct light only.
     pub(crate) surfaces: usize,
-    /// Largest radiance by way of a second surface.
-    pub(crate) clamp: f32,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -50,13 +60,42 @@ pub(crate) struct Traced {
     pub(crate) rays: u32,
 }
 
-/// A surface point with its shading frame.
+/// A surface point with its shading frame, on the side the light path is on.
 struct Point<'a> {
     position: Vec3,
     geometric: Vec3,
     frame: [Vec3; 3],
     wo: Vec3,
     surface: Surface<'a>,
+}
+
+/// A path on its way.
+struct Path<'a> {
+    world: &'a World,
+    rig: &'a LightRig,
+    sampler: &'a mut Sampler,
+    throughput: Vec3,
+    /// Surfaces met that scatter.
+    surfaces: usize,
+    traced: Traced,
+}
+
+/// A ray that leaves a surface.
+struct Leaving {
+    origin: Vec3,
+    direction: Vec3,
+    /// Density of the direction in solid angle, and where lights were looked for; none where only this ray
+    /// can find them.
+    looked: Option<(f32, LookedFor)>,
+}
+
+/// How lights were looked for from a point.
+#[derive(Clone, Copy)]
+struct LookedFor {
+    position: Vec3,
+    normal: Vec3,
+    /// Sum of the shares by which one light was picked; none where all were looked for.
+    total_share: Option<f32>,
 }
 
 impl World {
@@ -78,6 +117,12 @@ impl World {
         self.accel.nearest(origin, direction, f32::INFINITY)
     }
 
+    /// Unit shading normal at a hit, towards where the ray came from.
+    pub(crate) fn shading_normal(&self, hit: Hit, direction: Vec3) -> Vec3 {
+        let face = &self.faces[hit.face as usize];
+        face.shading_normal(hit.barycentric, direction, face.facing(direction))
+    }
+
     /// Radiance from `hit` back along the unit `direction` that found it.
     pub(crate) fn radiance(
         &self,
@@ -87,76 +132,250 @@ impl World {
         limits: &PathLimits,
         sampler: &mut Sampler,
     ) -> Traced {
-        let mut traced = Traced { radiance: Vec3::zeros(), rays: 0 };
-        let mut throughput = Vec3::repeat(1.0);
+        let traced = Traced { radiance: Vec3::zeros(), rays: 0 };
+        let mut path = Path { world: self, rig, sampler, throughput: Vec3::repeat(1.0), surfaces: 0, traced };
         let mut next = Some((hit, direction));
-        for depth in 0..limits.surfaces {
-            let Some((hit, direction)) = next.take() else { break };
-            let Some(point) = self.point(hit, direction) else { break };
-            let clamp = if depth == 0 { f32::INFINITY } else { limits.clamp };
-            let mut gather = |light: Vec3| traced.radiance += light.map(|c| c.min(clamp));
-            // Look for each light with a shadow ray.
-            for light in &rig.lights {
-                let Some(sample) = light.sample(point.position, sampler.pair()) else { continue };
-                let (seen, rays) = self.direct(&point, &sample);
-                gather(throughput.component_mul(&seen));
-                traced.rays += rays;
-            }
-            // Follow the surface; the ray finds the sky, a light, or the next surface.
-            let Some((scatter, towards)) = point.scatter(sampler.pair()) else { break };
-            traced.rays += 1;
-            throughput.component_mul_assign(&scatter.weight);
-            let origin = point.origin(towards, self.offset);
-            let found = self.accel.nearest(origin, towards, f32::INFINITY);
-            let reach = found.map_or(f32::INFINITY, |h| h.distance);
-            if let Some(light) = rig.hit(point.position, towards, reach) {
-                gather(throughput.component_mul(&light.radiance) * power_heuristic(scatter.pdf, light.pdf));
-            } else if found.is_none() {
-                gather(throughput.component_mul(&rig.sky.radiance(towards)));
-            } else {
-                next = found.map(|h| (h, towards));
+        for _ in 0..limits.surfaces + MAX_PASSAGES {
+            let Some((hit, direction)) = next else { break };
+            let Some(leaving) = path.meet(hit, direction) else { break };
+            next = path.follow(&leaving);
+            if path.surfaces >= limits.surfaces {
+                break;
             }
         }
-        traced
+        path.traced
     }
 
-    /// Light arriving from a sampled point, and the rays it took.
-    fn direct(&self, point: &Point<'_>, light: &LightSample) -> (Vec3, u32) {
+    fn finish(&self, face: &Face) -> &Finish {
+        self.finishes.get(usize::from(face.part)).or(self.finishes.last()).unwrap_or(&Finish::Matt)
+    }
+
+    /// The surface at a hit, seen from outside or, where `inside`, from within.
+    fn point<'a>(&self, hit: Hit, direction: Vec3, surface: Surface<'a>) -> Point<'a> {
+        let face = &self.faces[hit.face as usize];
+        let geometric = face.facing(direction);
+        let frame = frame_around(face.shading_normal(hit.barycentric, direction, geometric));
+        let wo = frame.map(|axis| -direction.dot(&axis)).into();
+        Point { position: face.position(hit.barycentric), geometric, frame, wo, surface }
+    }
+
+    fn is_inside(&self, hit: Hit, direction: Vec3) -> bool {
+        direction.dot(&self.faces[hit.face as usize].normal) >= 0.0
+    }
+
+    fn albedo(&self, hit: Hit, direction: Vec3) -> Vec3 {
+        let face = &self.faces[hit.face as usize];
+        let normal = face.shading_normal(hit.barycentric, direction, face.normal);
+        self.paint.albedo(face.position(hit.barycentric), normal, face.part)
+    }
+}
+
+impl Face {
+    fn position(&self, [u, v]: [f32; 2]) -> Vec3 {
+        self.corners[0] * (1.0 - u - v) + self.corners[1] * u + self.corners[2] * v
+    }
+
+    /// The facet's normal on the side a ray comes from.
+    fn facing(&self, direction: Vec3) -> Vec3 {
+        if direction.dot(&self.normal) >= 0.0 { -self.normal } else { self.normal }
+    }
+
+    /// The interpolated normal on the side of `geometric`; where it turns away from the eye, the facet's
+    /// own is the honest one.
+    fn shading_normal(&self, [u, v]: [f32; 2], direction: Vec3, geometric: Vec3) -> Vec3 {
+        let mixed = self.normals[0] * (1.0 - u - v) + self.normals[1] * u + self.normals[2] * v;
+        let sided = if mixed.dot(&geometric) < 0.0 { -mixed } else { mixed };
+        sided.try_normalize(1e-6).filter(|n| n.dot(&direction) < 0.0).unwrap_or(geometric)
+    }
+}
+
+impl<'a> Path<'a> {
+    /// Gathers light at a surface and says where the path goes on.
+    fn meet(&mut self, hit: Hit, direction: Vec3) -> Option<Leaving> {
+        let world = self.world;
+        let finish = world.finish(&world.faces[hit.face as usize]);
+        let inside = world.is_inside(hit, direction);
+        if let Finish::Glass(index) = finish {
+            return self.pass(hit, direction, if inside { 1.0 / index } else { *index });
+        }
+        if inside {
+            // The inner side of what is not glass, which no light reaches.
+            return None;
+        }
+        let albedo = world.albedo(hit, direction);
+        if let Finish::Translucent(coat, medium) = finish {
+            return self.enter(hit, direction, albedo, coat, *medium);
+        }
+        let surface = Surface { albedo, coat: finish.coat(), lobes: Lobes::All };
+        let choice = self.sampler.pair();
+        self.scatter(&world.point(hit, direction, surface), choice)
+    }
+
+    /// Looks for lights, then goes on in the direction drawn by `choice`.
+    fn scatter(&mut self, point: &Point<'_>, choice: [f32; 2]) -> Option<Leaving> {
+        let looked_for = self.look_for_lights(point);
+        self.surfaces += 1;
+        let drawn = point.surface.sample(point.wo, choice)?;
+        let direction = point.to_world(drawn.wi);
+        if direction.dot(&point.geometric) <= 0.0 {
+            return None;
+        }
+        self.throughput.component_mul_assign(&drawn.weight);
+        let origin = point.origin(direction, self.world.offset);
+        Some(Leaving { origin, direction, looked: Some((drawn.pdf, looked_for)) })
+    }
+
+    /// Smooth glass: reflects or refracts, by Fresnel's odds. `eta` is the index beyond over that before.
+    fn pass(&mut self, hit: Hit, direction: Vec3, eta: f32) -> Option<Leaving> {
+        let tint = self.world.albedo(hit, direction);
+        let surface = Surface { albedo: tint, coat: None, lobes: Lobes::All };
+        let point = self.world.point(hit, direction, surface);
+        let [u, _] = self.sampler.pair();
+        let cos = point.wo.z;
+        let wi = if u < fresnel_dielectric(cos, eta) {
+            reflect(point.wo, Vec3::z())
+        } else {
+            self.throughput.component_mul_assign(&tint);
+            let cos_t = (1.0 - (1.0 - cos * cos) / (eta * eta)).max(0.0).sqrt();
+            Vec3::new(-point.wo.x / eta, -point.wo.y / eta, -cos_t)
+        };
+        let direction = point.to_world(wi);
+        // Where the smooth normal sends the ray to the wrong side of the facet, the path is lost.
+        let stays = direction.dot(&point.geometric) * wi.z > 0.0;
+        stays.then(|| Leaving { origin: point.origin(direction, self.world.offset), direction, looked: None })
+    }
+
+    /// The coat of a translucent part reflects; the rest walks inside and comes out elsewhere.
+    fn enter(&mut self, hit: Hit, direction: Vec3, paint: Vec3, coat: &Coat, medium: Medium) -> Option<Leaving> {
+        let world = self.world;
+        let surface = Surface { albedo: paint, coat: Some(coat), lobes: Lobes::Entry };
+        let point = world.point(hit, direction, surface);
+        let p = surface.coat_share(point.wo);
+        let choice = self.sampler.pair();
+        if choice[0] < p {
+            return self.scatter(&point, choice);
+        }
+        // What the coat shows of the lights is looked for on every path, whichever way it goes on.
+        self.look_for_lights(&point);
+        self.throughput *= coat.entry_factor(point.wo) / (1.0 - p);
+        let inward = -point.to_world(cosine_hemisphere(self.sampler.pair()));
+        let origin = point.origin(-point.geometric, world.offset);
+        let inward = if inward.dot(&point.geometric) < 0.0 { inward } else { -point.geometric };
+        let (exit, towards) = self.walk(origin, inward, scattering_albedo(paint), medium)?;
+        let surface = Surface { albedo: Vec3::repeat(1.0), coat: Some(coat), lobes: Lobes::Exit };
+        let mut out = world.point(exit, towards, surface);
+        // The point is met from within; the light leaves on the other side.
+        out.turn_around();
+        let choice = self.sampler.pair();
+        self.scatter(&out, choice)
+    }
+
+    /// Walks among scatterers until the surface is met from within.
+    fn walk(&mut self, origin: Vec3, direction: Vec3, albedo: Vec3, medium: Medium) -> Option<(Hit, Vec3)> {
+        let (mut position, mut direction) = (origin, direction);
+        for step in 0..WALK.end {
+            let [flight, survival] = self.sampler.pair();
+            let flight = medium.flight(flight);
+            self.traced.rays += 1;
+            if let Some(hit) = self.world.accel.nearest(position, direction, flight) {
+                // A face met from outside, in here, belongs to another part stuck into this one.
+                return self.world.is_inside(hit, direction).then_some((hit, direction));
+            }
+            position += direction * flight;
+            self.throughput.component_mul_assign(&albedo);
+            if step >= WALK.start && !self.survives(survival) {
+                return None;
+            }
+            direction = isotropic(self.sampler.pair());
+        }
+        None
+    }
+
+    /// Russian roulette by the throughput.
+    fn survives(&mut self, u: f32) -> bool {
+        let chance = self.throughput.max().min(SURVIVAL);
+        if u >= chance {
+            return false;
+        }
+        self.throughput /= chance;
+        true
+    }
+
+    /// Follows a ray to a light, the sky or the next surface.
+    fn follow(&mut self, leaving: &Leaving) -> Option<(Hit, Vec3)> {
+        if self.surfaces > 1 {
+            let [u, _] = self.sampler.pair();
+            if !self.survives(u) {
+                return None;
+            }
+        }
+        let Leaving { origin, direction, looked } = leaving;
+        self.traced.rays += 1;
+        let found = self.world.accel.nearest(*origin, *direction, f32::INFINITY);
+        let reach = found.map_or(f32::INFINITY, |h| h.distance);
+        if let Some((light, index)) = self.rig.hit(*origin, *direction, reach) {
+            let weight = looked.as_ref().map_or(1.0, |(pdf, looked_for)| {
+                power_heuristic(*pdf, light.pdf * looked_for.probability(self.rig, index))
+            });
+            self.traced.radiance += self.throughput.component_mul(&light.radiance) * weight;
+            return None;
+        }
+        if found.is_none() {
+            self.traced.radiance += self.throughput.component_mul(&self.rig.sky.radiance(*direction));
+        }
+        found.map(|hit| (hit, *direction))
+    }
+
+    /// Adds what lights give directly: all of them at the first surface, then one.
+    fn look_for_lights(&mut self, point: &Point<'_>) -> LookedFor {
+        let (rig, [position, normal]) = (self.rig, [point.position, point.frame[2]]);
+        if self.surfaces == 0 || rig.lights.len() < 2 {
+            for light in &rig.lights {
+                let sample = light.sample(point.position, self.sampler.pair());
+                self.gather(point, sample.as_ref(), 1.0);
+            }
+            return LookedFor { position, normal, total_share: None };
+        }
+        let total = rig.lights.iter().map(|l| l.share(position, normal)).sum::<f32>();
+        let [u, _] = self.sampler.pair();
+        let mut left = u * total;
+        let last = rig.lights.len() - 1;
+        for (i, light) in rig.lights.iter().enumerate() {
+            let share = light.share(position, normal);
+            if left < share || i == last {
+                let sample = light.sample(position, self.sampler.pair());
+                self.gather(point, sample.as_ref(), share / total);
+                break;
+            }
+            left -= share;
+        }
+        LookedFor { position, normal, total_share: Some(total) }
+    }
+
+    /// Adds light from a sampled point of a light that was picked with the given probability.
+    fn gather(&mut self, point: &Point<'_>, light: Option<&LightSample>, probability: f32) {
+        let Some(light) = light else { return };
         let wi = point.to_local(light.direction);
         let f = point.surface.evaluate(wi, point.wo);
         if light.direction.dot(&point.geometric) <= 0.0 || f.max() <= 0.0 {
-            return (Vec3::zeros(), 0);
+            return;
         }
-        let origin = point.origin(light.direction, self.offset);
-        if self.accel.is_blocked(origin, light.direction, light.distance) {
-            return (Vec3::zeros(), 1);
+        self.traced.rays += 1;
+        let origin = point.origin(light.direction, self.world.offset);
+        if self.world.accel.is_blocked(origin, light.direction, light.distance) {
+            return;
         }
-        let weight = power_heuristic(light.pdf, point.surface.pdf(wi, point.wo));
-        (f.component_mul(&light.radiance) * (wi.z / light.pdf * weight), 1)
+        let pdf = light.pdf * probability;
+        let weight = power_heuristic(pdf, point.surface.pdf(wi, point.wo));
+        let light = f.component_mul(&light.radiance) * (wi.z / pdf * weight);
+        self.traced.radiance += self.throughput.component_mul(&light);
     }
+}
 
-    /// The surface at a hit; `None` on its inner side, which no light reaches.
-    fn point(&self, hit: Hit, direction: Vec3) -> Option<Point<'_>> {
-        let face = &self.faces[hit.face as usize];
-        if direction.dot(&face.normal) >= 0.0 {
-            return None;
-        }
-        let [u, v] = hit.barycentric;
-        let mixed = |c: &[Vec3; 3]| c[0] * (1.0 - u - v) + c[1] * u + c[2] * v;
-        let position = mixed(&face.corners);
-        // Where the interpolated normal turns away from the eye, the facet's own is the honest one.
-        let smooth = mixed(&face.normals).try_normalize(1e-6).filter(|n| n.dot(&direction) < 0.0);
-        let normal = smooth.unwrap_or(face.normal);
-        let frame = frame_around(normal);
-        let wo = frame.map(|axis| -direction.dot(&axis)).into();
-        let albedo = self.paint.albedo(position, normal, face.part);
-        let finish = self.finishes.get(usize::from(face.part)).or(self.finishes.last());
-        let coat = match finish {
-            Some(Finish::Glazed(coat)) => Some(coat),
-            Some(Finish::Matt) | None => None,
-        };
-        let surface = Surface { albedo, coat };
-        Some(Point { position, geometric: face.normal, frame, wo, surface })
+impl LookedFor {
+    /// With what probability this light was looked for.
+    fn probability(&self, rig: &LightRig, light: usize) -> f32 {
+        self.total_share.map_or(1.0, |total| rig.lights[light].share(self.position, self.normal) / total)
     }
 }
 
@@ -165,16 +384,20 @@ impl Point<'_> {
         self.frame.map(|axis| d.dot(&axis)).into()
     }
 
-    /// A direction to follow in the world; none below the facet itself.
-    fn scatter(&self, u: [f32; 2]) -> Option<(Scatter, Vec3)> {
-        let s = self.surface.sample(self.wo, u)?;
+    fn to_world(&self, d: Vec3) -> Vec3 {
         let [x, y, z] = self.frame;
-        let towards = x * s.wi.x + y * s.wi.y + z * s.wi.z;
-        (towards.dot(&self.geometric) > 0.0).then_some((s, towards))
+        x * d.x + y * d.y + z * d.z
     }
 
     fn origin(&self, towards: Vec3, offset: f32) -> Vec3 {
         self.position + self.geometric * offset.copysign(towards.dot(&self.geometric))
+    }
+
+    /// To the other side of the surface, as seen along its normal.
+    fn turn_around(&mut self) {
+        self.geometric = -self.geometric;
+        self.frame = frame_around(-self.frame[2]);
+        self.wo = Vec3::z();
     }
 }
 
@@ -182,15 +405,6 @@ fn power_heuristic(a: f32, b: f32) -> f32 {
     // Scaled by the larger, lest the squares overflow.
     let r = b / a;
     if r.is_finite() { 1.0 / (1.0 + r * r) } else { 0.0 }
-}
-
-/// An orthonormal frame with the given z (Duff et al., "Building an Orthonormal Basis, Revisited",
-/// JCGT 2017).
-fn frame_around(n: Vec3) -> [Vec3; 3] {
-    let sign = 1.0_f32.copysign(n.z);
-    let a = -1.0 / (sign + n.z);
-    let b = n.x * n.y * a;
-    [Vec3::new(1.0 + sign * n.x * n.x * a, sign * b, -sign * n.x), Vec3::new(b, sign + n.y * n.y * a, -n.y), n]
 }
 
 #[cfg(test)]
@@ -201,7 +415,7 @@ mod tests {
     use crate::shape::{MeshBuilder, corner_normals, sphere};
     use std::f64::consts::PI;
 
-    const LIMITS: PathLimits = PathLimits { surfaces: 4, clamp: f32::INFINITY };
+    const LIMITS: PathLimits = PathLimits { surfaces: 100 };
 
     fn world(mesh: &Mesh, albedo: f32, finish: Finish) -> World {
         World::new(mesh, &corner_normals(mesh, 1.0), &[], Paint::Plain(Vec3::repeat(albedo)), vec![finish])
@@ -231,7 +445,16 @@ mod tests {
     #[test]
     fn white_sphere_vanishes_in_a_white_furnace() {
         let rig = LightRig { sky: Sky::uniform(1.0), lights: vec![] };
-        for (finish, slack) in [(Finish::Matt, 1e-6), (Finish::glazed(0.15, 1.5), 2e-3)] {
+        let finishes = [
+            (Finish::Matt, 1e-6),
+            (Finish::glazed(0.15, 1.5), 2e-3),
+            (Finish::metal(0.02), 2e-3),
+            (Finish::metal(0.4), 2e-3),
+            (Finish::glass(1.5), 1e-6),
+            // A walk of more than a thousand steps is given up.
+            (Finish::translucent(0.15, 1.5, 0.3), 3e-3),
+        ];
+        for (finish, slack) in finishes {
             let world = world(&sphere(1.0, 64), 1.0, finish);
             for x in [0.0, 0.5, 0.9] {
                 let (mean, error) = measure(&world, Vec3::new(x, 0.1, 5.0), -Vec3::z(), &rig, 40_000);
@@ -269,6 +492,58 @@ mod tests {
         let (x, y) = (a / h, b / h);
         let half = |x: f64, y: f64| x / (1.0 + x * x).sqrt() * (y / (1.0 + x * x).sqrt()).atan();
         let expected = 2.0 / 2.0 * (half(x, y) + half(y, x)) / PI;
+        assert!((mean - expected).abs() < 3.0 * error, "{mean} ± {error} against {expected}");
+    }
+
+    fn ball(center: Vec3, radius: f32, radiance: f32) -> AreaLight {
+        AreaLight::facing(LightShape::Sphere, center, Vec3::zeros(), [radius, radius], Vec3::repeat(radiance))
+    }
+
+    #[test]
+    fn plane_under_a_sphere_light() {
+        // E = π L (a/D)² cos θ wherever the whole sphere is above the horizon; L = albedo E / π.
+        let (a, h, albedo, l) = (0.4_f32, 1.5_f32, 0.7_f32, 5.0_f32);
+        let rig = LightRig { sky: Sky::uniform(0.0), lights: vec![ball(Vec3::new(0.0, 0.0, h), a, l)] };
+        let world = world(&plane(), albedo, Finish::Matt);
+        for x in [0.0_f32, 1.0, 3.0] {
+            // From the side, so that the eye's ray does not start inside the light.
+            let direction = Vec3::new(0.0, 0.6, -0.8);
+            let (mean, error) = measure(&world, Vec3::new(x, 0.0, 0.0) - direction, direction, &rig, 100_000);
+            let d2 = x * x + h * h;
+            let expected = f64::from(albedo * l * a * a / d2 * h / d2.sqrt());
+            assert!((mean - expected).abs() < 3.0 * error, "at {x}: {mean} ± {error} against {expected}");
+        }
+    }
+
+    #[test]
+    fn inside_of_a_sphere_around_its_light() {
+        // Each point of the wall sees the ball under F = (a/r)² of its cosine-weighted hemisphere, and the
+        // wall, alike everywhere, in the rest: B = ρ (π L F + (1 − F) B).
+        let (a, albedo, l) = (0.3_f64, 0.8_f64, 2.0_f64);
+        let mut mesh = sphere(1.0, 200);
+        mesh.faces.iter_mut().for_each(|f| f.swap(1, 2));
+        let rig = LightRig { sky: Sky::uniform(0.0), lights: vec![ball(Vec3::zeros(), a as f32, l as f32)] };
+        let world = world(&mesh, albedo as f32, Finish::Matt);
+        let (mean, error) = measure(&world, Vec3::new(0.2, 0.5, 0.1), Vec3::x(), &rig, 100_000);
+        let f = a * a;
+        let expected = albedo * l * f / (1.0 - albedo * (1.0 - f));
+        // 5e-4: the polyhedron lies up to 3e-5 inside the sphere, at 28 of its edges.
+        assert!((mean - expected).abs() < 3.0 * error + 5e-4 * expected, "{mean} ± {error} against {expected}");
+    }
+
+    #[test]
+    fn a_pane_of_glass_reflects_and_passes_as_fresnel_says() {
+        // A thin slab: R = 2 r / (1 + r) of both faces with all reflections between them, r = 0.04.
+        let mut b = MeshBuilder::default();
+        let (low, high) = (b.rectangle([9.0, 9.0], -0.05), b.rectangle([9.0, 9.0], 0.05));
+        b.cap_reversed(&low);
+        b.walls(&low, &high);
+        b.cap(&high);
+        let world = world(&b.mesh, 1.0, Finish::glass(1.5));
+        let sky = Sky { ground: Vec3::zeros(), horizon: Vec3::zeros(), zenith: Vec3::repeat(1.0) };
+        let rig = LightRig { sky, lights: vec![] };
+        let (mean, error) = measure(&world, Vec3::new(0.0, 0.0, 2.0), -Vec3::z(), &rig, 100_000);
+        let expected = 2.0 * 0.04 / 1.04;
         assert!((mean - expected).abs() < 3.0 * error, "{mean} ± {error} against {expected}");
     }
 

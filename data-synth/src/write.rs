@@ -159,11 +159,12 @@ fn io_error(path: &Path) -> impl FnOnce(std::io::Error) -> SynthError {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Scene, SynthOptions, synthesize};
+    use crate::{Effort, Scene, SynthOptions, synthesize};
     use nalgebra::{Point3, Vector4};
 
     fn small() -> SynthCapture {
-        let options = SynthOptions { views: 2, width: 32, height: 24, samples_per_pixel: 1, ..SynthOptions::default() };
+        let options =
+            SynthOptions { views: 2, width: 32, height: 24, effort: Effort::Samples(1), ..SynthOptions::default() };
         synthesize(Scene::Temple, &options).unwrap()
     }
 

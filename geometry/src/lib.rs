@@ -2,6 +2,7 @@
 //!
 //! This crate knows shapes and cameras, and no colour, no appearance and no GPU.
 
+pub mod accuracy;
 pub mod atlas;
 pub mod depth;
 mod error;
@@ -11,6 +12,7 @@ mod param;
 mod segment;
 mod simplify;
 
+pub use accuracy::{Accuracy, AccuracyOptions, accuracy};
 pub use atlas::{UnwrapOptions, UnwrapReport, Unwrapped, unwrap_mesh};
 pub use depth::DepthMap;
 pub use error::GeometryError;

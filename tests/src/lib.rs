@@ -1,6 +1,6 @@
 //! What the whole-pipeline tests share: the command, captures to break, and where real data lies.
 
-use data_synth::{Scene, SynthOptions, synthesize};
+use data_synth::{Effort, Scene, SynthOptions, synthesize};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
@@ -62,8 +62,14 @@ fn build() -> PathBuf {
 /// # Panics
 /// Where it cannot be made.
 pub fn small_capture(folder: &Path, views: usize) -> PathBuf {
-    let options =
-        SynthOptions { views, width: 96, height: 72, samples_per_pixel: 2, surfaces: 1, ..SynthOptions::default() };
+    let options = SynthOptions {
+        views,
+        width: 96,
+        height: 72,
+        effort: Effort::Samples(2),
+        surfaces: 1,
+        ..SynthOptions::default()
+    };
     let path = folder.join("capture");
     let filmed = synthesize(Scene::Temple, &options).unwrap_or_else(|e| panic!("{e}"));
     filmed.write(&path).unwrap_or_else(|e| panic!("{e}"));

@@ -78,6 +78,9 @@ fn wrong_arguments_return_2() {
         &["synth", "temple", "-o", "s", "--size", "10"],
         &["synth", "unheard-of", "-o", "s"],
         &["info", "capture", "--quiet", "-v"],
+        &["info", "capture", "--truth", "capture/truth.ply"],
+        &["info", "capture/truth.ply", "--tolerance", "1"],
+        &["info", "capture/truth.ply", "--truth", "capture/truth.ply", "--tolerance", "-1"],
     ] {
         let run = turnlight(place.path(), args);
         assert_eq!(run.code, Some(2), "{args:?}: {}", run.stderr);
@@ -320,6 +323,62 @@ fn reports_have_the_keys_of_the_contract() {
     assert_eq!(model["method"], "dyntex");
     assert!(model["facets"].is_number() && model["ranks"].is_array() && model["bytes"]["appearance"].is_number());
     assert_eq!(model["bytes"]["file"], fs::metadata(place.path().join("m.glb")).expect("a model").len());
+}
+
+/// Writes a cube around the origin.
+fn write_cube(path: &Path, half: f64) {
+    let corner = |i: i32| [i & 1, i >> 1 & 1, i >> 2].map(|bit| half * f64::from(2 * bit - 1));
+    let mut text: String = (0..8).map(corner).map(|[x, y, z]| format!("v {x} {y} {z}\n")).collect();
+    for [a, b, c, d] in [[1, 3, 4, 2], [5, 6, 8, 7], [1, 2, 6, 5], [3, 7, 8, 4], [1, 5, 7, 3], [2, 4, 8, 6]] {
+        text.push_str(&format!("f {a} {b} {c}\nf {a} {c} {d}\n"));
+    }
+    fs::write(path, text).expect("written");
+}
+
+#[test]
+fn a_mesh_is_held_against_the_truth() {
+    let place = tempfile::tempdir().expect("a folder");
+    write_cube(&place.path().join("truth.obj"), 1.0);
+    write_cube(&place.path().join("mesh.obj"), 1.1);
+    let info = |args: &[&str]| turnlight(place.path(), &[&["info", "mesh.obj", "--truth"], args].concat());
+    let found = json(&info(&["truth.obj", "--json"]));
+    let figure = |key: &str| found[key].as_f64().unwrap_or_else(|| panic!("no {key} in {found}"));
+    assert_eq!(found["triangles"], 12, "what info says of any mesh is still there");
+    // Every point of the truth is a tenth from the mesh; beside the edges the mesh is farther from the truth.
+    assert!(figure("accuracy_90") > 0.1 && figure("accuracy_90") < 0.12, "{found}");
+    assert!((figure("signed_mean_of_truth") + 0.1).abs() < 1e-9 && figure("signed_mean") > 0.1, "{found}");
+    assert!((figure("hausdorff") - 0.1 * 3.0_f64.sqrt()).abs() < 1e-9, "{found}");
+    assert!(figure("distance_rms") >= figure("distance_mean") && figure("distance_mean") > 0.1);
+    assert!((figure("tolerance") - 0.02 * 3.0_f64.sqrt()).abs() < 1e-12, "a hundredth of the diagonal");
+    assert_eq!((figure("completeness_pct"), figure("left_out_pct")), (0.0, 0.0));
+    assert_eq!(json(&info(&["truth.obj", "--tolerance", "0.11", "--json"]))["completeness_pct"], 100.0);
+    let text = info(&["truth.obj"]).stdout;
+    assert!(text.contains("unit of the mesh") && text.contains("bias +1."), "{text}");
+    let args = ["info", "mesh.obj", "--truth", "none.ply"];
+    assert_fails(place.path(), &args, &["none.ply"]);
+    fs::write(place.path().join("point.obj"), "v 0 0 0\nf 1 1 1\n").expect("written");
+    assert_fails(place.path(), &["info", "mesh.obj", "--truth", "point.obj"], &["true mesh"]);
+}
+
+#[test]
+fn a_comparison_judges_the_shape_where_the_truth_is_known() {
+    let place = place();
+    let compare = || turnlight(place.path(), &["compare", "capture", "--method", "static", "-o", "r", "--json"]);
+    let compared = json(&compare());
+    let figure = |key: &str| compared["geometry"][key].as_f64().unwrap_or_else(|| panic!("no {key} in {compared}"));
+    // In metres: the temple is about 0.2 long, its pixels at this size 3 mm.
+    assert_eq!(figure("tolerance"), 0.00125);
+    assert!(figure("accuracy_90") > 1e-4 && figure("accuracy_90") < 0.05, "{}", figure("accuracy_90"));
+    assert!(figure("completeness_pct") > 1.0 && figure("signed_mean") > 0.0, "{compared}");
+    let page = fs::read_to_string(place.path().join("r/report.html")).expect("a page");
+    assert!(page.contains("90 % of the mesh within"));
+    // A truth that is no mesh is named and left out; so is one that is not there, in silence.
+    let truth = place.path().join("capture/truth.ply");
+    fs::write(&truth, "ply?").expect("written");
+    let run = compare();
+    assert!(run.stderr.contains("truth.ply") && json(&run).get("geometry").is_none(), "{}", run.stderr);
+    fs::remove_file(&truth).expect("removed");
+    assert!(json(&compare()).get("geometry").is_none());
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! The whole way on a small synthetic capture, whose truth is known.
 
 use capture::{Capture, LoadOptions, View};
-use data_synth::{Scene, SynthOptions, synthesize};
+use data_synth::{Effort, Scene, SynthOptions, synthesize};
 use nalgebra::Point3;
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -17,7 +17,7 @@ fn views(count: usize) -> (Vec<View>, f64) {
         views: count,
         width: 160,
         height: 120,
-        samples_per_pixel: 4,
+        effort: Effort::Samples(4),
         surfaces: 1,
         ..SynthOptions::default()
     };
@@ -80,6 +80,7 @@ fn compare(
         load: LoadOptions::default(),
         shape: ShapeOptions::default(),
         fit: FitOptions::default(),
+        truth: None,
     };
     evaluate::compare(capture, "small", &options, report, &mut Stages::new(&Silent))
 }

@@ -181,6 +181,12 @@ pub(crate) struct ImportArgs {
 pub(crate) struct InfoArgs {
     /// A capture, a mesh (.ply .obj .glb) or a model
     pub(crate) path: PathBuf,
+    /// Hold the mesh or model against this true mesh (.ply .obj .glb): accuracy, completeness, bias
+    #[arg(long, value_name = "MESH")]
+    pub(crate) truth: Option<PathBuf>,
+    /// Distance up to which the truth counts as covered, in the mesh's unit [default: 1 % of the truth's diagonal]
+    #[arg(long, value_name = "LENGTH", requires = "truth", value_parser = length)]
+    pub(crate) tolerance: Option<f64>,
     /// Find silhouettes in the photographs even where masks are given
     #[arg(long)]
     pub(crate) ignore_masks: bool,
@@ -307,6 +313,11 @@ fn pixels(text: &str) -> Result<f64, String> {
     within(text, 0.0, 1000.0)
 }
 
+fn length(text: &str) -> Result<f64, String> {
+    let value = text.parse().ok().filter(|value: &f64| value.is_finite() && *value >= 0.0);
+    value.ok_or_else(|| "needs a length of 0 or more, in the mesh's unit".to_owned())
+}
+
 fn rate(text: &str) -> Result<f64, String> {
     within(text, 0.02, 650.0)
 }
@@ -349,6 +360,10 @@ mod tests {
         for text in ["640", "0x5", "5x0", "99999x99999", "axb"] {
             assert!(size(text).is_err(), "{text}");
         }
+        for text in ["nan", "inf", "-1", "1 mm"] {
+            assert!(length(text).is_err(), "{text}");
+        }
+        assert_eq!(length("1.25e-3"), Ok(0.00125));
         assert_eq!(axis("-y"), Ok([0.0, -1.0, 0.0]));
     }
 }

@@ -5,7 +5,8 @@
 //! - [`evaluate`]: the four methods on held-out views, as JSON, CSV and one HTML page;
 //! - [`inspect`]: what a mesh, a model or a capture holds;
 //! - [`output`]: files and folders that appear whole or not at all;
-//! - [`stages`]: what each stage costs.
+//! - [`stages`]: what each stage costs;
+//! - [`truth`]: a mesh held against the true one.
 
 mod error;
 pub mod evaluate;
@@ -15,6 +16,7 @@ pub mod pipeline;
 pub mod playback;
 mod selection;
 pub mod stages;
+pub mod truth;
 
 pub use error::Error;
 pub use selection::Selection;

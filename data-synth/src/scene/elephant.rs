@@ -14,6 +14,10 @@ const TUSK: u8 = 1;
 const EYE: u8 = 2;
 const EAR: u8 = 3;
 
+/// GGX roughness of the polish, and its index of refraction.
+const ROUGHNESS: f32 = 0.13;
+const INDEX: f32 = 1.52;
+
 /// Metres per modelling unit.
 const SCALE: f64 = 0.13;
 /// Grid cells per modelling unit.
@@ -35,10 +39,12 @@ pub(crate) fn build() -> MeshBuilder {
     b
 }
 
-/// What the parts are made of, in their order: one glaze over everything, rough enough for highlights a
-/// few degrees wide that move with the view.
+/// What the parts are made of, in their order. Body and ears are jade: light goes about a millimetre
+/// between scatterers. One polish over everything, rough enough for highlights a few degrees wide that
+/// move with the view.
 pub(crate) fn finishes() -> Vec<Finish> {
-    vec![Finish::glazed(0.13, 1.52)]
+    let (jade, opaque) = (Finish::translucent(ROUGHNESS, INDEX, 1.2e-3), Finish::glazed(ROUGHNESS, INDEX));
+    vec![jade.clone(), opaque.clone(), opaque, jade]
 }
 
 /// Distance to the whole figure; tusks grow out of the cheek in a soft collar.

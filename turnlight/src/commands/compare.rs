@@ -4,7 +4,7 @@ use super::CaptureArgs;
 use crate::Answer;
 use crate::arguments::CompareArgs;
 use serde_json::json;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use turnlight::Error;
 use turnlight::capture::Capture;
 use turnlight::evaluate::{self, CompareOptions, Comparison};
@@ -22,6 +22,7 @@ pub(crate) fn run(args: &CompareArgs, observer: &dyn Observer) -> Result<Answer,
         load: args.capture.load_options(),
         shape: args.mesh.options(),
         fit: args.fit.options(),
+        truth: truth_beside(&args.capture.capture),
     };
     let name = capture_name(&args.capture);
     let report = args.output.as_deref().map(OutputFolder::create).transpose()?;
@@ -30,6 +31,12 @@ pub(crate) fn run(args: &CompareArgs, observer: &dyn Observer) -> Result<Answer,
         report.finish()?;
     }
     answer(&comparison, args.output.as_deref())
+}
+
+/// The true surface, where a capture comes with one: `truth.ply` in its folder.
+pub(super) fn truth_beside(capture: &Path) -> Option<PathBuf> {
+    let folder = if capture.is_dir() { capture } else { capture.parent()? };
+    Some(folder.join("truth.ply")).filter(|path| path.is_file())
 }
 
 /// Compares, and writes the report's pages where there is a report.

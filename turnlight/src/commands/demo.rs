@@ -1,6 +1,6 @@
 //! `turnlight demo`
 
-use super::compare::evaluate_into;
+use super::compare::{evaluate_into, truth_beside};
 use super::synth::film;
 use crate::Answer;
 use crate::arguments::DemoArgs;
@@ -88,6 +88,7 @@ fn compare(capture: &Capture, folder: &OutputFolder, stages: &mut Stages<'_>) ->
         load: LoadOptions::default(),
         shape: ShapeOptions::default(),
         fit: FitOptions::default(),
+        truth: truth_beside(&folder.path().join("capture")),
     };
     let report = OutputFolder::create(&folder.path().join("report"))?;
     let comparison = evaluate_into(capture, SCENE.name(), &options, Some(&report), stages)?;

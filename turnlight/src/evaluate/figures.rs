@@ -2,6 +2,7 @@
 
 use super::{Cost, Judged};
 use crate::stages::Stage;
+use crate::truth::TruthFigures;
 use serde::Serialize;
 use texture::Method;
 use texture::metrics::ViewScore;
@@ -17,6 +18,9 @@ pub struct Comparison {
     pub test: Vec<usize>,
     /// Positions asked for and left out: fitted themselves, or within 2° of a view that was.
     pub left_out: Vec<usize>,
+    /// How near the shape comes to the truth, where the truth is known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub geometry: Option<TruthFigures>,
     /// What the stages cost.
     pub stages: Vec<Stage>,
     /// One row per method.

@@ -19,10 +19,12 @@ pub use table::{csv, text};
 use crate::output::OutputFolder;
 use crate::pipeline::{self, ShapeOptions};
 use crate::stages::{Observer, Stages};
+use crate::truth::{self, TruthFigures};
 use crate::{Error, playback};
 use capture::{Capture, Image, LoadOptions, View};
 use figures::round6;
 use geometry::TexturedMesh;
+use geometry::mesh::io::read_mesh;
 use nalgebra::Point3;
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
@@ -51,6 +53,8 @@ pub struct CompareOptions {
     pub shape: ShapeOptions,
     /// How the appearances are fitted.
     pub fit: FitOptions,
+    /// The true surface, to hold the shape against; it has no part in the fit.
+    pub truth: Option<PathBuf>,
 }
 
 /// Compares the methods on `capture`; `name` is what the report calls it. Rendered views, references and
@@ -67,6 +71,7 @@ pub fn compare(
 ) -> Result<Comparison, Error> {
     let train = stages.run("load", |_| capture.load_views(&options.train, &options.load))?;
     let mesh = pipeline::shape(&train, capture.aabb, &options.shape, stages)?;
+    let geometry = options.truth.as_deref().and_then(|path| judge_shape(&mesh, path, capture.unit, stages));
     let (test, left_out) = without_leaks(capture, &mesh, &options.train, &options.test);
     if test.is_empty() {
         let fault = format!("every test view is a training view or lies within {LEAK_DEG}° of one");
@@ -98,6 +103,7 @@ pub fn compare(
         train: options.train.clone(),
         test,
         left_out,
+        geometry,
         stages: stages.finished().to_vec(),
         methods,
     })
@@ -122,6 +128,16 @@ struct Judged {
     temporal: Option<f64>,
     frame_ms: f64,
     frame_size: [usize; 2],
+}
+
+/// A truth that cannot be used is no reason to compare nothing: it is named and left out.
+fn judge_shape(mesh: &TexturedMesh, path: &Path, unit: Option<f64>, stages: &mut Stages<'_>) -> Option<TruthFigures> {
+    let judged = stages.run("judge shape", |_| {
+        let truth = read_mesh(path)?.mesh;
+        truth::judge(&mesh.mesh, &truth, truth::default_tolerance(&truth, unit))
+    });
+    let unused = |fault| stages.observer().noted(&format!("{}: the shape is not judged: {fault}", path.display()));
+    judged.map_err(unused).ok()
 }
 
 /// Test positions a training view gives away go to the second list.

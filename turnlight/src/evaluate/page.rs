@@ -26,6 +26,9 @@ pub fn html(comparison: &Comparison, report: &OutputFolder) -> Result<String, Er
         super::LEAK_DEG,
     );
     push_figures(&mut page, comparison);
+    if let Some(geometry) = &comparison.geometry {
+        page.push_str(&format!("<p>{}</p>\n", escaped(&geometry.text())));
+    }
     page.push_str("<h2>Error per view</h2>\n");
     page.push_str(&plot::error_per_view(comparison)?);
     page.push_str("\n<h2>Held-out views</h2>\n");

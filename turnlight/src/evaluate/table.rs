@@ -62,6 +62,9 @@ pub fn text(comparison: &Comparison) -> String {
         comparison.methods.iter().for_each(|m| out.push_str(&format!("{:>12}", cell(column, m))));
     }
     out.push('\n');
+    if let Some(geometry) = &comparison.geometry {
+        out.push_str(&format!("{}\n", geometry.text()));
+    }
     out
 }
 
