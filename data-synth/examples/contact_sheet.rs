@@ -2,7 +2,7 @@
 //! `contact_sheet FILE [SAMPLES COLUMNS WIDTH HEIGHT [TURNS [SCENE...]]]`. With several turns each scene
 //! is shown that often, evenly around, otherwise from its best side.
 
-use data_synth::{Layout, Scene, SynthOptions, synthesize};
+use data_synth::{Effort, Layout, Scene, SynthOptions, synthesize};
 use std::time::Instant;
 
 /// Behind the objects, 8-bit sRGB.
@@ -20,9 +20,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         views: turns,
         width: number(2, 320)?,
         height: number(3, 240)?,
-        samples_per_pixel: u32::try_from(number(0, 16)?)?,
-        surfaces: 8,
-        layout: Layout::Rings { elevations_deg: vec![ELEVATION_DEG] },
+        effort: Effort::Samples(u32::try_from(number(0, 16)?)?),
         ..SynthOptions::default()
     };
     let named: Vec<Scene> = rest.iter().skip(5).map(|s| s.parse()).collect::<Result<_, _>>()?;
@@ -30,9 +28,12 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut tiles = Vec::new();
     for scene in scenes {
         let start = Instant::now();
-        let capture = synthesize(scene, &options)?;
-        println!("{scene}: {} faces, {:.1} s", capture.mesh.faces.len(), start.elapsed().as_secs_f64());
-        tiles.extend(capture.views.into_iter().map(|view| (view.image, view.matte)));
+        let capture = synthesize(scene, &from_best_side(scene, &options))?;
+        let size = (capture.aabb.max - capture.aabb.min).map(|e| (1e3 * e).round());
+        let [x, y, z] = size.into();
+        let seconds = start.elapsed().as_secs_f64();
+        println!("{scene}: {} faces, {x} x {y} x {z} mm, {seconds:.1} s", capture.mesh.faces.len());
+        tiles.extend(capture.views.into_iter().rev().take(turns).rev().map(|view| (view.image, view.matte)));
     }
     let [w, h] = [options.width, options.height];
     let rows = tiles.len().div_ceil(columns);
@@ -45,6 +46,22 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         }
     }
     Ok(sheet.save(file)?)
+}
+
+/// A single turn starts where the object shows best: the last of two views along a stretch of a ring.
+fn from_best_side(scene: Scene, options: &SynthOptions) -> SynthOptions {
+    let azimuth_deg = match scene {
+        Scene::Temple => 322.0,
+        Scene::Elephant => 300.0,
+        _ => 0.0,
+    };
+    if options.views > 1 || azimuth_deg == 0.0 {
+        return SynthOptions { layout: Layout::Rings { elevations_deg: vec![ELEVATION_DEG] }, ..options.clone() };
+    }
+    // Of two views the second stands half the turns on.
+    let turns = azimuth_deg / 180.0;
+    let layout = Layout::Spiral { from_deg: ELEVATION_DEG, to_deg: ELEVATION_DEG, turns };
+    SynthOptions { views: 2, layout, ..options.clone() }
 }
 
 /// The object over the paper. Pictures hold the object on black, mixed in linear light; what is behind

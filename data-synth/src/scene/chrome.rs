@@ -82,19 +82,19 @@ pub(crate) fn build() -> MeshBuilder {
 fn spout(b: &mut MeshBuilder, edge: &[u32]) {
     let at = |y: f64, z: f64| P::new(0.0, y, z);
     let points = [
-        at(0.0525, 0.0375),
-        at(0.0640, 0.0410),
-        at(0.0745, 0.0485),
-        at(0.0820, 0.0585),
-        at(0.0885, 0.0685),
-        at(0.0970, 0.0755),
+        at(0.0543, 0.0340),
+        at(0.0640, 0.0378),
+        at(0.0740, 0.0458),
+        at(0.0816, 0.0566),
+        at(0.0885, 0.0676),
+        at(0.0970, 0.0752),
     ];
     let path = curve(&points, 14);
     let last = path.len() - 1;
     let half = |k: usize| {
         let t = k as f64 / last as f64;
         let flare = 0.0016 * ((t - 0.86).max(0.0) / 0.14).powi(2);
-        [0.0155 * (1.0 - t).powf(1.3) + 0.0062 + flare, 0.0150 * (1.0 - t).powf(1.3) + 0.0058 + flare]
+        [0.0135 * (1.0 - t).powf(1.6) + 0.0062 + flare, 0.0062 * (1.0 - t).powf(1.3) + 0.0058 + flare]
     };
     let lip = b.sleeve(edge, &path, P::x(), 30, half);
     // Over the lip and a little way in.
@@ -128,7 +128,7 @@ fn handle(b: &mut MeshBuilder, edges: &[Vec<u32>], [low, high]: [f64; 2]) {
 
 /// What the parts are made of.
 pub(crate) fn finishes() -> Vec<Finish> {
-    vec![Finish::glazed(0.05, 8.0), Finish::glazed(0.12, 1.5)]
+    vec![Finish::metal(0.02), Finish::glazed(0.12, 1.5)]
 }
 
 /// Silver (Rakić et al. 1998, rounded) and dark wood.

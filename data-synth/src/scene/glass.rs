@@ -90,7 +90,7 @@ fn smooth(points: &[[f64; 2]]) -> Vec<[f64; 2]> {
 
 /// What it is made of: lead crystal.
 pub(crate) fn finishes() -> Vec<Finish> {
-    vec![Finish::glazed(0.05, 1.54)]
+    vec![Finish::glass(1.54)]
 }
 
 /// Clear.

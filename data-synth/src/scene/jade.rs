@@ -5,12 +5,12 @@ use super::clay::{chain, ellipsoid, smooth_max, smooth_min};
 use crate::isosurface::{Grid, extract};
 use crate::material::{Finish, Vec3};
 use crate::shape::{MeshBuilder, P};
-use crate::texture_field::{blend, color, fractal, step};
+use crate::texture_field::{blend, color, fractal, step, stripe};
 
 /// Metres per modelling unit.
 const SCALE: f64 = 0.12;
 /// Grid cells per modelling unit.
-const CELLS: f64 = 72.0;
+const CELLS: f64 = 66.0;
 /// Cosine and sine of the turn on the table: three quarters from the front seen along x.
 const TURN: [f64; 2] = [0.642_787_6, 0.766_044_4];
 
@@ -83,8 +83,8 @@ fn carapace(q: P) -> f64 {
     let dome = ellipsoid(q, P::new(0.0, 0.0, 0.185), P::new(0.50, 0.405, 0.300));
     let (first, second) = nearest_scutes(q);
     let groove = (1.0 - (second - first) / 0.026).max(0.0);
-    let rings = 0.0045 * (first * 120.0).cos() * (first / 0.06).min(1.0);
-    let dome = dome + 0.022 * groove * groove - rings - 0.016 * (1.0 - first / 0.13).max(0.0);
+    let rings = 0.006 * (first * 120.0).cos() * (first / 0.06).min(1.0);
+    let dome = dome + 0.034 * groove * groove - rings - 0.016 * (1.0 - first / 0.13).max(0.0);
     let dome = smooth_max(dome, 0.17 - q.z, 0.02);
     let angle = (q.y / 0.46).atan2(q.x / 0.57);
     let scallop = 1.0 + 0.022 * (22.0 * angle).cos().abs();
@@ -114,13 +114,22 @@ fn nearest_scutes(q: P) -> (f64, f64) {
 
 /// What it is made of: polished stone that light enters.
 pub(crate) fn finishes() -> Vec<Finish> {
-    vec![Finish::glazed(0.12, 1.61)]
+    vec![Finish::translucent(0.10, 1.61, 0.0007)]
 }
 
-/// Pale green with darker clouds and a russet skin on the back of the shell.
+/// Pale green with darker clouds and a russet skin on the back of the shell; wax darkens the grooves.
 pub(crate) fn albedo(p: Vec3) -> Vec3 {
     let cloud = fractal(p * 36.0, 3, 9);
-    let tone = blend(color([128, 176, 138]), color([206, 226, 196]), step(0.5, 0.5, cloud));
+    let tone = blend(color([112, 166, 124]), color([196, 222, 186]), step(0.5, 0.5, cloud));
     let skin = step(0.60, 0.16, fractal(p * 24.0 + Vec3::repeat(3.1), 3, 21)) * step(0.035, 0.02, p.z);
-    blend(tone, color([176, 122, 62]), 0.7 * skin)
+    let tone = blend(tone, color([176, 122, 62]), 0.7 * skin);
+    if p.z < 0.19 * SCALE as f32 {
+        return tone;
+    }
+    let [cos, sin] = TURN;
+    let q = p.cast::<f64>() / SCALE;
+    let q = P::new(cos * q.x + sin * q.y + 0.06, (cos * q.y - sin * q.x).abs(), q.z);
+    let (first, second) = nearest_scutes(q);
+    let groove = stripe((second - first) as f32, 0.010, 0.02) * step(0.0, 0.1, 0.6 - q.x as f32);
+    blend(tone, color([40, 70, 46]), 0.75 * groove)
 }

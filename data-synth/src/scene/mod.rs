@@ -24,7 +24,7 @@ use geometry::Mesh;
 use std::fmt;
 use std::str::FromStr;
 
-/// A procedural object, in metres, standing on z = 0 around the z axis; its best side faces +x.
+/// A procedural object, in metres, standing on z = 0 around the z axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Scene {
     /// A small Greek temple of matt, weathered stone with a tiled roof.

@@ -202,6 +202,8 @@ fn oval(t: f64, half: f64, fullest: f64) -> f64 {
 }
 
 fn leaf(b: &mut MeshBuilder, root: P, along: P, up: P, chance: &mut Chance) {
+    // Lies close to the bundle, under the flowers.
+    let along = (across(along, up) + up * 0.12).normalize();
     b.part = LEAF;
     let (length, curl) = (chance.between(0.014, 0.024), chance.between(0.1, 0.5));
     let half = length * chance.between(0.15, 0.21);
@@ -313,10 +315,10 @@ fn bow(b: &mut MeshBuilder) {
         b.sheet([4, 30], 0.00018, |u, t| {
             let angle = TAU * t;
             let (reach, open) = (0.5 - 0.5 * angle.cos(), angle.sin());
-            let width = 0.0085 * (0.35 + 0.65 * reach);
+            let width = 0.0098 * (0.30 + 0.65 * reach);
             let middle = level * (side * 0.036 * reach)
                 + P::x() * (0.0115 * open + 0.004 * reach)
-                + up * (0.008 * reach + 0.0025 * open);
+                + up * (0.015 * reach + 0.0030 * open);
             knot + middle + up * ((2.0 * u - 1.0) * width) + P::x() * (0.0008 * (9.0 * u + 5.0 * t).sin() * reach)
         });
         b.sheet([4, 26], 0.00018, |u, t| {
