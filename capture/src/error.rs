@@ -39,6 +39,10 @@ pub enum CaptureError {
         /// The factor asked for.
         downscale: usize,
     },
+    /// OpenCV could not work on an image in memory.
+    #[cfg(feature = "video")]
+    #[error("OpenCV failed ({}); report this as a bug", .0.message.trim())]
+    OpenCv(#[from] opencv::Error),
 }
 
 impl CaptureError {

@@ -13,6 +13,7 @@
 //! # Ok::<(), capture::CaptureError>(())
 //! ```
 
+pub mod board;
 mod camera;
 mod capture_set;
 pub mod contour;
@@ -24,10 +25,15 @@ mod load;
 mod masks;
 mod matte;
 mod pixels;
+#[cfg(feature = "video")]
+mod saddle;
 pub mod silhouette;
+#[cfg(feature = "video")]
+pub mod video;
 mod votes;
 mod write;
 
+pub use board::{Board, BoardError};
 pub use camera::{Camera, Distortion, Intrinsics, Projected, Ray};
 pub use capture_set::{Aabb, Capture, Frame, LoadOptions, View};
 pub use contour::{BinaryMatte, ContourOptions, Contours, Surround};

@@ -132,7 +132,7 @@ pub(crate) fn touches_border(matte: &Image<u8>) -> bool {
 
 /// Area average over whole blocks, in encoded values, of each channel; a rest at the right and bottom
 /// is dropped, as `Camera::downscaled` assumes.
-fn reduced(image: &Image<[u8; 3]>, factor: usize) -> Image<[u8; 3]> {
+pub(crate) fn reduced(image: &Image<[u8; 3]>, factor: usize) -> Image<[u8; 3]> {
     if factor == 1 {
         return image.clone();
     }

@@ -18,7 +18,7 @@
 //! "Revisiting Physically Based Shading at Imageworks", 2017): `F² Ē / (1 − F (1 − Ē))`, `F` averaged
 //! over directions.
 //!
-//! Translucent: glazed, but the base is what comes back out of the body; see `medium`. Light enters by
+//! Translucent: glazed, but the base is what comes out of the body around the point; see `medium`. Light enters by
 //! the factor `1 − E(cos_o)` and leaves by `(1 − E(cos_i)) / (1 − mean E)`: the same sum, with the exit
 //! elsewhere.
 //!
@@ -83,14 +83,14 @@ pub(crate) struct Surface<'a> {
 }
 
 /// Parts of the reflection at a point.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Lobes {
     /// Coat and base.
     All,
     /// The coat alone: the base is inside.
     Entry,
-    /// What comes out from inside, alone.
-    Exit,
+    /// What comes out from inside, alone; followed with this probability.
+    Exit(f32),
 }
 
 /// A sampled direction to follow.
@@ -276,7 +276,7 @@ impl Surface<'_> {
                 base + coat.evaluate(wi, wo, self.albedo)
             }
             Lobes::Entry => coat.evaluate(wi, wo, self.albedo),
-            Lobes::Exit => self.albedo * (coat.exit_factor(wi) / PI),
+            Lobes::Exit(_) => self.albedo * (coat.exit_factor(wi) / PI),
         }
     }
 
@@ -287,9 +287,13 @@ impl Surface<'_> {
         }
         let p = self.coat_share(wo);
         let coat = self.coat.filter(|_| p > 0.0).map_or(0.0, |c| c.pdf(wi, wo));
-        // At an entry the rest of the draws goes inside.
-        let base = if self.lobes == Lobes::Entry { 0.0 } else { wi.z / PI };
-        p * coat + (1.0 - p) * base
+        let base = match self.lobes {
+            Lobes::All => 1.0 - p,
+            // The rest of the draws goes inside.
+            Lobes::Entry => 0.0,
+            Lobes::Exit(share) => share,
+        };
+        p * coat + base * wi.z / PI
     }
 
     /// Draws a direction; `None` where the draw falls below the surface, or inside.
@@ -318,7 +322,7 @@ impl Surface<'_> {
     /// five. The base finds lights by shadow rays and the sky is smooth; a highlight found by one
     /// sample in ten is a speckle.
     pub(crate) fn coat_share(&self, wo: Vec3) -> f32 {
-        let Some(coat) = self.coat.filter(|_| self.lobes != Lobes::Exit) else { return 0.0 };
+        let Some(coat) = self.coat.filter(|_| !matches!(self.lobes, Lobes::Exit(_))) else { return 0.0 };
         let e = coat.directional_albedo(wo.z);
         let (coated, base) = match coat.fresnel {
             Fresnel::Dielectric(_) => (e, (1.0 - e) * self.albedo.max()),
@@ -358,7 +362,7 @@ pub(crate) fn concentric_disk(u: [f32; 2]) -> [f32; 2] {
     [r * phi.cos(), r * phi.sin()]
 }
 
-pub(crate) fn cosine_hemisphere(u: [f32; 2]) -> Vec3 {
+fn cosine_hemisphere(u: [f32; 2]) -> Vec3 {
     let [x, y] = concentric_disk(u);
     Vec3::new(x, y, (1.0 - x * x - y * y).max(0.0).sqrt())
 }

@@ -6,15 +6,22 @@ use crate::sampler::{mix, unit};
 
 /// Smooth noise in [0, 1] with features of unit size.
 pub(crate) fn noise(p: Vec3, seed: u32) -> f32 {
-    let cell = p.map(f32::floor);
-    let f = (p - cell).map(smoothstep);
-    let at = |dx: i32, dy: i32, dz: i32| {
-        let [x, y, z] =
-            [(cell.x as i32).wrapping_add(dx), (cell.y as i32).wrapping_add(dy), (cell.z as i32).wrapping_add(dz)];
-        unit(mix(mix(mix(x as u32 ^ seed) ^ y as u32) ^ z as u32))
+    // Rounding down by hand: without SSE 4.1 `floor` is a call.
+    let cell = p.map(|c| {
+        let towards_zero = c as i32;
+        towards_zero - i32::from(towards_zero as f32 > c)
+    });
+    let f = (p - cell.map(|c| c as f32)).map(smoothstep);
+    let next = |hash: u32, c: i32| [mix(hash ^ c as u32), mix(hash ^ c.wrapping_add(1) as u32)];
+    let along_x = |[a, b]: [u32; 2]| lerp(unit(a), unit(b), f.x);
+    // Hashes of the corners share those of the edges they lie on.
+    let [near, far] = [cell.x, cell.x.wrapping_add(1)].map(|x| next(mix(x as u32 ^ seed), cell.y));
+    let ends = |y: usize| {
+        let (a, b) = (next(near[y], cell.z), next(far[y], cell.z));
+        [along_x([a[0], b[0]]), along_x([a[1], b[1]])]
     };
-    let along_x = |dy, dz| lerp(at(0, dy, dz), at(1, dy, dz), f.x);
-    lerp(lerp(along_x(0, 0), along_x(1, 0), f.y), lerp(along_x(0, 1), along_x(1, 1), f.y), f.z)
+    let ([a, b], [c, d]) = (ends(0), ends(1));
+    lerp(lerp(a, c, f.y), lerp(b, d, f.y), f.z)
 }
 
 /// Sum of `octaves` of noise, each twice as fine and half as strong, scaled to [0, 1].

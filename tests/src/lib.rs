@@ -45,6 +45,9 @@ fn build() -> PathBuf {
     let profile = here.ancestors().nth(2).unwrap_or_else(|| panic!("{} is in no target folder", here.display()));
     let mut cargo = Command::new(env!("CARGO"));
     cargo.args(["build", "--quiet", "--package", "turnlight", "--bin", "turnlight"]);
+    if cfg!(feature = "video") {
+        cargo.args(["--features", "video"]);
+    }
     if profile.ends_with("release") {
         cargo.arg("--release");
     }

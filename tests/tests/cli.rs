@@ -411,3 +411,46 @@ fn a_second_run_replaces_the_first() {
     }
     assert_eq!(listing(place.path()), ["capture", "imported", "report"]);
 }
+
+#[test]
+fn boards_are_drawn_to_the_scale_they_say() {
+    let place = tempfile::tempdir().expect("a folder");
+    for (file, start) in [("a.pdf", &b"%PDF-1.7"[..]), ("a.svg", b"<svg"), ("a.png", b"\x89PNG")] {
+        let answer = json(&turnlight(place.path(), &["board", "-o", file, "--square", "2.5cm", "--json"]));
+        assert_eq!(answer["board"], "charuco:7x5:25mm:18.75mm:4x4_50");
+        assert_eq!(answer["size_mm"], serde_json::json!([175.0, 125.0]));
+        assert!(fs::read(place.path().join(file)).expect("a sheet").starts_with(start), "{file}");
+    }
+    let before = listing(place.path());
+    for (args, word) in [
+        (&["-o", "b.gif"][..], ".pdf"),
+        (&["-o", "b.pdf", "--square", "30"], "unit"),
+        (&["-o", "b.pdf", "--columns", "20"], "larger paper"),
+        (&["-o", "b.pdf", "--columns", "12", "--rows", "12", "--square", "10mm"], "larger dictionary"),
+        (&["-o", "b.pdf", "--dictionary", "4x4"], "4x4_50"),
+        (&["-o", "b.pdf", "--paper", "a9"], "letter"),
+    ] {
+        let run = turnlight(place.path(), &[&["board"], args].concat());
+        assert_eq!(run.code, Some(2), "{args:?}: {}", run.stderr);
+        assert!(run.stderr.contains(word), "{args:?} does not say '{word}': {}", run.stderr);
+    }
+    assert_eq!(listing(place.path()), before);
+}
+
+#[test]
+fn films_are_written_where_the_build_can() {
+    let place = tempfile::tempdir().expect("a folder");
+    let args = ["synth", "elephant", "-o", "capture", "--views", "4", "--size", "64x48", "--quiet", "--video"];
+    let run = turnlight(place.path(), &[&args[..], &["film.gif"]].concat());
+    assert_eq!(run.code, Some(2), "{}", run.stderr);
+    assert!(run.stderr.contains(".apng") && listing(place.path()).is_empty(), "{}", run.stderr);
+    let run = turnlight(place.path(), &[&args[..], &["film.mp4"]].concat());
+    if cfg!(feature = "video") {
+        assert_eq!((run.code, run.stderr.as_str()), (Some(0), ""));
+        assert!(fs::read(place.path().join("film.mp4")).expect("a film")[4..].starts_with(b"ftyp"));
+    } else {
+        assert_eq!(run.code, Some(2), "{}", run.stderr);
+        assert!(run.stderr.contains("--features video"), "{}", run.stderr);
+        assert!(listing(place.path()).is_empty());
+    }
+}

@@ -3,10 +3,19 @@
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
 use turnlight::Selection;
+use turnlight::capture::board::{Dictionary, Paper, parse_length};
+
+/// What this build can and cannot do.
+const FILMS: &str = if cfg!(feature = "video") {
+    "Built with films (.mp4 .mov .avi .mkv), through OpenCV."
+} else {
+    "Built without films (.mp4 .mov .avi .mkv): to read and write them, install libopencv-dev, clang and libclang-dev and build with \
+     --features video."
+};
 
 /// Turns photographs of an object on a turntable into one that can be played back from any direction.
 #[derive(Debug, Parser)]
-#[command(version, propagate_version = true)]
+#[command(version, propagate_version = true, after_help = FILMS)]
 pub(crate) struct Cli {
     #[command(flatten)]
     pub(crate) general: General,
@@ -33,6 +42,8 @@ pub(crate) struct General {
 
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
+    /// Draw a calibration board to print, to scale (.pdf .svg .png)
+    Board(BoardArgs),
     /// Compare the four methods on held-out views: table, plot, crops
     Compare(CompareArgs),
     /// Film a synthetic object, model it, compare the methods
@@ -117,6 +128,48 @@ pub(crate) enum MethodArg {
     Vdtm,
     /// Unstructured lumigraph
     Lumigraph,
+}
+
+/// The patterns.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum BoardKind {
+    /// A chessboard with markers in its light squares: a part of it is enough
+    Charuco,
+    /// Alternating squares: must be seen whole
+    Chessboard,
+    /// Markers in rows and columns
+    Aruco,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct BoardArgs {
+    /// The sheet to write (.pdf .svg .png)
+    #[arg(short, long, value_name = "FILE")]
+    pub(crate) output: PathBuf,
+    /// The pattern
+    #[arg(long, value_enum, default_value = "charuco")]
+    pub(crate) kind: BoardKind,
+    /// Squares or markers from left to right
+    #[arg(long, value_name = "N", default_value = "7", value_parser = whole_factor)]
+    pub(crate) columns: usize,
+    /// Squares or markers from top to bottom
+    #[arg(long, value_name = "N", default_value = "5", value_parser = whole_factor)]
+    pub(crate) rows: usize,
+    /// Side of a square; of a marker and its gap where there are no squares
+    #[arg(long, value_name = "LENGTH", default_value = "30mm", value_parser = length)]
+    pub(crate) square: f64,
+    /// Side of a marker [default: three quarters of a square]
+    #[arg(long, value_name = "LENGTH", value_parser = length)]
+    pub(crate) marker: Option<f64>,
+    /// Whose markers, as in 4x4_50, 5x5_100, 6x6_250, aruco_original, apriltag_36h11
+    #[arg(long, default_value = "4x4_50")]
+    pub(crate) dictionary: Dictionary,
+    /// a4, a3, a2, a1, a0, letter or tabloid
+    #[arg(long, default_value = "a4")]
+    pub(crate) paper: Paper,
+    /// Resolution of a .png
+    #[arg(long, value_name = "N", default_value = "300", value_parser = dpi)]
+    pub(crate) dpi: f64,
 }
 
 #[derive(Debug, Args)]
@@ -227,7 +280,7 @@ pub(crate) struct RenderArgs {
     /// Where the pictures go, one PNG per camera
     #[arg(short, long, value_name = "DIR", required_unless_present = "video")]
     pub(crate) output: Option<PathBuf>,
-    /// Write a film (.png .apng: an animated PNG)
+    /// Write a film (.png .apng: animated; .mp4 .mov .avi .mkv where built with films)
     #[arg(long, value_name = "FILE")]
     pub(crate) video: Option<PathBuf>,
     /// Frames per second of the film
@@ -260,7 +313,7 @@ pub(crate) struct SynthArgs {
     /// Seed of everything random
     #[arg(long, default_value = "1")]
     pub(crate) seed: u64,
-    /// Write the frames as a film too (.png .apng: an animated PNG)
+    /// Write the frames as a film too (.png .apng: animated; .mp4 .mov .avi .mkv where built with films)
     #[arg(long, value_name = "FILE")]
     pub(crate) video: Option<PathBuf>,
 }
@@ -320,6 +373,14 @@ fn length(text: &str) -> Result<f64, String> {
 
 fn rate(text: &str) -> Result<f64, String> {
     within(text, 0.02, 650.0)
+}
+
+fn dpi(text: &str) -> Result<f64, String> {
+    within(text, 30.0, 2400.0)
+}
+
+fn length(text: &str) -> Result<f64, String> {
+    parse_length(text).map_err(|fault| fault.to_string())
 }
 
 fn within(text: &str, least: f64, most: f64) -> Result<f64, String> {

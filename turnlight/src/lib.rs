@@ -3,6 +3,7 @@
 //!
 //! - [`pipeline`]: views → hull → simplified mesh → atlas → appearance;
 //! - [`evaluate`]: the four methods on held-out views, as JSON, CSV and one HTML page;
+//! - [`film`]: films of every kind this build can write;
 //! - [`inspect`]: what a mesh, a model or a capture holds;
 //! - [`output`]: files and folders that appear whole or not at all;
 //! - [`stages`]: what each stage costs;
@@ -10,6 +11,7 @@
 
 mod error;
 pub mod evaluate;
+pub mod film;
 pub mod inspect;
 pub mod output;
 pub mod pipeline;

@@ -21,6 +21,8 @@ struct Answer {
 }
 
 fn main() -> ExitCode {
+    #[cfg(feature = "video")]
+    silence_ffmpeg();
     let cli = Cli::parse();
     match run(&cli) {
         Ok(()) => ExitCode::SUCCESS,
@@ -31,6 +33,18 @@ fn main() -> ExitCode {
     }
 }
 
+/// FFmpeg prints its own faults on standard error; ours name the file and the remedy. Whoever wants to hear it sets the
+/// variable (OpenCV's, a level of libavutil: -8 is none).
+#[cfg(feature = "video")]
+#[allow(unsafe_code, reason = "OpenCV takes this setting from the environment alone")]
+fn silence_ffmpeg() {
+    const LEVEL: &str = "OPENCV_FFMPEG_LOGLEVEL";
+    if std::env::var_os(LEVEL).is_none() {
+        // SAFETY: called first in `main`, before any other thread is started.
+        unsafe { std::env::set_var(LEVEL, "-8") };
+    }
+}
+
 fn run(cli: &Cli) -> Result<(), Error> {
     if let Some(threads) = cli.general.threads {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
@@ -38,6 +52,7 @@ fn run(cli: &Cli) -> Result<(), Error> {
     }
     let progress = Progress::new(cli.general.quiet, cli.general.verbose);
     let answer = match &cli.command {
+        Command::Board(args) => commands::board::run(args),
         Command::Compare(args) => commands::compare::run(args, &progress),
         Command::Demo(args) => commands::demo::run(args, &progress),
         Command::Hull(args) => commands::hull::run(args, &progress),

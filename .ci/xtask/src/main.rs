@@ -1,6 +1,6 @@
-//! Chores, run as `cargo xtask demo` and `cargo xtask test`.
+//! Chores, run as `cargo xtask demo`, `cargo xtask test` and `cargo xtask lint`.
 //!
-//! Both bring what they need: system packages through `apt-get` where it exists, and for the tests a
+//! All bring what they need: system packages through `apt-get` where it exists, and for the tests a
 //! glTF validator and a Python environment below `target/tools`. What cannot be brought is said, and
 //! the tests that wanted it skip, saying so.
 
@@ -11,14 +11,16 @@ use anyhow::{Context, Result, bail};
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
 
-const USAGE: &str = "usage: cargo xtask demo [ARGS] | test [ARGS]
+const USAGE: &str = "usage: cargo xtask demo [ARGS] | test [ARGS] | lint [ARGS]
   demo   build turnlight and run its demo; ARGS go to `turnlight demo`
+  lint   run clippy over all of it; ARGS go to `cargo clippy`
   test   run the whole test suite; ARGS go to `cargo test`";
 
 fn main() -> ExitCode {
     let args: Vec<String> = std::env::args().skip(1).collect();
     let outcome = match args.split_first() {
         Some((chore, rest)) if chore == "demo" => demo(rest),
+        Some((chore, rest)) if chore == "lint" => lint(rest),
         Some((chore, rest)) if chore == "test" => test(rest),
         _ => {
             eprintln!("{USAGE}");
@@ -41,12 +43,31 @@ fn demo(args: &[String]) -> Result<()> {
     run(cargo(&root).args(["run", "--release", "--package", "turnlight", "--", "demo"]).args(args))
 }
 
-/// Runs every test of the workspace.
+/// Runs every test of the workspace, with films where OpenCV is to be had.
 fn test(args: &[String]) -> Result<()> {
     packages::ensure(&[packages::COMPILER])?;
     let root = root()?;
     let tools = tools::prepare(&root);
-    run(cargo(&root).args(["test", "--workspace"]).args(args).envs(tools))
+    run(cargo(&root).args(["test", "--workspace"]).args(features()).args(args).envs(tools))
+}
+
+/// Runs the linter over every target, as the tests build them.
+fn lint(args: &[String]) -> Result<()> {
+    packages::ensure(&[packages::COMPILER])?;
+    let root = root()?;
+    let clippy = ["clippy", "--workspace", "--all-targets"];
+    run(cargo(&root).args(clippy).args(features()).args(args).args(["--", "-D", "warnings"]))
+}
+
+/// What to build besides the default.
+fn features() -> &'static [&'static str] {
+    match packages::ensure(&[packages::OPENCV, packages::CLANG]) {
+        Ok(()) => &["--features", "tests/video"],
+        Err(fault) => {
+            eprintln!("xtask: OpenCV is not to be had ({fault:#}); films are neither built nor tested");
+            &[]
+        }
+    }
 }
 
 fn cargo(root: &Path) -> Command {

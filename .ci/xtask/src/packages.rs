@@ -14,6 +14,11 @@ pub(crate) struct Package {
 
 /// Mesh simplification is C++.
 pub(crate) const COMPILER: Package = Package { probe: &["c++", "--version"], names: &["g++"] };
+/// Films and calibration: OpenCV's headers, and what reads them to make the bindings.
+pub(crate) const OPENCV: Package =
+    Package { probe: &["pkg-config", "--exists", "opencv4"], names: &["libopencv-dev", "pkg-config"] };
+/// Runs while the bindings are made; its headers come with it.
+pub(crate) const CLANG: Package = Package { probe: &["clang", "--version"], names: &["clang", "libclang-dev"] };
 /// Runs the glTF validator.
 pub(crate) const NODE: Package = Package { probe: &["npm", "--version"], names: &["nodejs", "npm"] };
 /// Runs the referee.

@@ -1,5 +1,6 @@
 //! One file per command: read, call the library, answer.
 
+pub(crate) mod board;
 pub(crate) mod compare;
 pub(crate) mod demo;
 pub(crate) mod hull;

@@ -7,11 +7,11 @@ use serde_json::json;
 use std::time::Instant;
 use turnlight::capture::{Aabb, Camera, Capture, Image};
 use turnlight::output::OutputFolder;
-use turnlight::render::film;
+use turnlight::render::film::write_png;
 use turnlight::render::path::{turntable_cameras, up_axis};
 use turnlight::stages::{Observer, Stages};
 use turnlight::texture::Model;
-use turnlight::{Error, playback};
+use turnlight::{Error, film, playback};
 
 /// Frames of a film for which no number is given.
 const TURNTABLE_FRAMES: usize = 72;
@@ -23,7 +23,7 @@ type Numbered = (usize, Camera);
 
 pub(crate) fn run(args: &RenderArgs, observer: &dyn Observer) -> Result<Answer, Error> {
     if let Some(video) = &args.video {
-        super::check_extension(video, &["png", "apng"])?;
+        film::check(video)?;
     }
     let mut stages = Stages::new(observer);
     let model = stages
@@ -107,7 +107,7 @@ fn draw(
     let mut fault = None;
     let mut keep = |number: usize, frame: &Image<[u8; 4]>| {
         if let (Some(folder), None) = (folder, &fault) {
-            let write = || Ok(film::write_png(&folder.place(format!("{number:04}.png"))?, frame)?);
+            let write = || Ok(write_png(&folder.place(format!("{number:04}.png"))?, frame)?);
             fault = write().err();
         }
     };

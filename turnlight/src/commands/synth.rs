@@ -6,7 +6,7 @@ use serde_json::json;
 use std::path::Path;
 use turnlight::Error;
 use turnlight::data_synth::{Layout, Scene, SynthCapture, SynthError, SynthOptions, synthesize_with};
-use turnlight::render::film::write_film;
+use turnlight::film;
 use turnlight::stages::{Observer, Stages};
 
 /// Frames per second of the film.
@@ -16,6 +16,7 @@ pub(crate) fn run(args: &SynthArgs, observer: &dyn Observer) -> Result<Answer, E
     let scene: Scene = args.scene.parse().map_err(|fault| Error::Arguments(format!("{fault}")))?;
     let [width, height] = args.size;
     refuse_occupied(&args.output)?;
+    args.video.as_deref().map(film::check).transpose()?;
     let options = SynthOptions {
         views: args.views,
         width,
@@ -29,7 +30,7 @@ pub(crate) fn run(args: &SynthArgs, observer: &dyn Observer) -> Result<Answer, E
     stages.run("write", |_| filmed.write(&args.output))?;
     if let Some(video) = &args.video {
         let frames: Vec<_> = filmed.views.iter().map(|v| v.image.map(|[r, g, b]| [r, g, b, 255])).collect();
-        stages.run("write film", |_| write_film(video, frames, FPS))?;
+        stages.run("write film", |_| film::write_film(video, frames, FPS))?;
     }
     let mut text =
         format!("{}: {} views of {width} × {height}\nwrote {}", scene.name(), args.views, args.output.display());
