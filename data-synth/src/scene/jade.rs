@@ -67,7 +67,7 @@ fn head(q: P) -> f64 {
 fn claws(q: P) -> f64 {
     let claw = |x: f64, y: f64, turn: f64, reach: f64| {
         let (s, c) = turn.sin_cos();
-        chain(q, &[(x, y, 0.040, 0.024), (x + c * reach, y + s * reach, 0.022, 0.011)], 0.01)
+        chain(q, &[(x, y, 0.040, 0.028), (x + c * reach, y + s * reach, 0.024, 0.016)], 0.01)
     };
     let fore = (0..4)
         .map(|k| 0.05 + 0.38 * f64::from(k))
