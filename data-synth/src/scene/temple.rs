@@ -47,7 +47,7 @@ pub(crate) fn build() -> MeshBuilder {
     cella(&mut b, &floor, &ceiling);
     let eaves = entablature(&mut b, beam);
     roof(&mut b, &eaves);
-    b
+    b.without_strays()
 }
 
 fn steps(b: &mut MeshBuilder) -> Vec<u32> {
