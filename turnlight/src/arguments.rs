@@ -248,7 +248,7 @@ pub(crate) struct InfoArgs {
     #[arg(long, value_name = "MESH")]
     pub(crate) truth: Option<PathBuf>,
     /// Distance up to which the truth counts as covered, in the mesh's unit [default: 1 % of the truth's diagonal]
-    #[arg(long, value_name = "LENGTH", requires = "truth", value_parser = length)]
+    #[arg(long, value_name = "LENGTH", requires = "truth", value_parser = tolerance)]
     pub(crate) tolerance: Option<f64>,
     /// Find silhouettes in the photographs even where masks are given
     #[arg(long)]
@@ -326,6 +326,82 @@ pub(crate) struct SynthArgs {
     /// Write the frames as a film too (.png .apng: animated; .mp4 .mov .avi .mkv where built with films)
     #[arg(long, value_name = "FILE")]
     pub(crate) video: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) filming: FilmingArgs,
+    #[command(flatten)]
+    pub(crate) faults: FaultArgs,
+}
+
+/// How a scene is filmed.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Filming")]
+pub(crate) struct FilmingArgs {
+    /// What the light is fixed to: the room, as on a turntable, or the object
+    #[arg(long, default_value = "room")]
+    pub(crate) light: LightArg,
+    /// Where the cameras stand: on rings, on a spiral that climbs, or at random above the table
+    #[arg(long, default_value = "rings")]
+    pub(crate) layout: LayoutArg,
+    /// Elevations in degrees: of the rings; of the spiral's ends; the lowest of random cameras
+    #[arg(long, value_name = "DEG,..", value_delimiter = ',', allow_negative_numbers = true)]
+    pub(crate) elevations: Option<Vec<f64>>,
+    /// Full turns of the spiral
+    #[arg(long, value_name = "N", default_value = "5", value_parser = turns)]
+    pub(crate) turns: f64,
+    /// Paths of light per pixel
+    #[arg(long, value_name = "N", default_value = "8", value_parser = samples)]
+    pub(crate) samples: u32,
+    /// Trace as many paths as it takes for this noise over the object, in levels of 255 (instead of --samples)
+    #[arg(long, value_name = "LEVELS", value_parser = levels, conflicts_with = "samples")]
+    pub(crate) noise: Option<f64>,
+    /// Write radiance, depth, normals and noise of every view as truth/NNNN.exr
+    #[arg(long)]
+    pub(crate) maps: bool,
+}
+
+/// What goes wrong; nothing unless asked for.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Faults")]
+pub(crate) struct FaultArgs {
+    /// Noise of a sensor that is white at this many electrons, with ten of read noise (a phone: 5000)
+    #[arg(long, value_name = "ELECTRONS")]
+    pub(crate) sensor_noise: Option<f64>,
+    /// Exposure that drifts from view to view by so many stops (standard deviation)
+    #[arg(long, value_name = "STOPS", default_value = "0")]
+    pub(crate) exposure_drift: f64,
+    /// Cameras that stand and point off by so many degrees (standard deviation), and are known
+    #[arg(long, value_name = "DEG", default_value = "0")]
+    pub(crate) jitter: f64,
+    /// Cameras written with an error of so many pixels (standard deviation)
+    #[arg(long, value_name = "PX", default_value = "0")]
+    pub(crate) calibration_error: f64,
+    /// Masks grown by so many pixels; negative shrinks
+    #[arg(long, value_name = "PX", default_value = "0", allow_negative_numbers = true)]
+    pub(crate) mask_grow: f64,
+    /// Round holes in every mask
+    #[arg(long, value_name = "N", default_value = "0")]
+    pub(crate) mask_holes: usize,
+    /// Turn of the table while the shutter is open, in degrees
+    #[arg(long, value_name = "DEG", default_value = "0")]
+    pub(crate) motion_blur: f64,
+    /// Radial distortion k1 of the lens, known
+    #[arg(long, value_name = "K1", default_value = "0", allow_negative_numbers = true)]
+    pub(crate) distortion: f64,
+}
+
+/// What the light is fixed to.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(crate) enum LightArg {
+    Room,
+    Object,
+}
+
+/// How cameras are spread.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(crate) enum LayoutArg {
+    Rings,
+    Spiral,
+    Hemisphere,
 }
 
 #[derive(Debug, Args)]
@@ -406,9 +482,17 @@ fn pixels(text: &str) -> Result<f64, String> {
     within(text, 0.0, 1000.0)
 }
 
-fn length(text: &str) -> Result<f64, String> {
+fn tolerance(text: &str) -> Result<f64, String> {
     let value = text.parse().ok().filter(|value: &f64| value.is_finite() && *value >= 0.0);
     value.ok_or_else(|| "needs a length of 0 or more, in the mesh's unit".to_owned())
+}
+
+fn turns(text: &str) -> Result<f64, String> {
+    within(text, 0.01, 1000.0)
+}
+
+fn levels(text: &str) -> Result<f64, String> {
+    within(text, 0.05, 64.0)
 }
 
 fn rate(text: &str) -> Result<f64, String> {
