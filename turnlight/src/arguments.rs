@@ -349,7 +349,7 @@ pub(crate) struct FilmingArgs {
     #[arg(long, value_name = "N", default_value = "5", value_parser = turns)]
     pub(crate) turns: f64,
     /// Paths of light per pixel
-    #[arg(long, value_name = "N", default_value = "8", value_parser = samples)]
+    #[arg(long, value_name = "N", default_value = "32", value_parser = samples)]
     pub(crate) samples: u32,
     /// Trace as many paths as it takes for this noise over the object, in levels of 255 (instead of --samples)
     #[arg(long, value_name = "LEVELS", value_parser = levels, conflicts_with = "samples")]
