@@ -3,13 +3,14 @@
 
 use crate::error::SynthError;
 use crate::synth::SynthCapture;
-use capture::{Camera, Image};
+use capture::{Aabb, Camera, Image, View};
 use geometry::Mesh;
 use image::{ExtendedColorType, ImageFormat};
 use nalgebra::{Matrix4, Vector3};
 use serde_json::{Value, json};
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use tempfile::TempDir;
 
 impl SynthCapture {
     /// Writes the capture folder `dir`, which must not exist yet or be empty.
@@ -18,7 +19,28 @@ impl SynthCapture {
     /// [`SynthError::Exists`] where the folder holds something, otherwise names the file that could
     /// not be written.
     pub fn write(&self, dir: impl AsRef<Path>) -> Result<(), SynthError> {
-        let dir = dir.as_ref();
+        let mut folder = CaptureFolder::create(dir.as_ref())?;
+        for (view, light) in self.views.iter().zip(&self.light_directions) {
+            folder.add(view, light)?;
+        }
+        folder.finish(&self.mesh, &self.aabb, &[])
+    }
+}
+
+/// A capture folder under construction, a view at a time. Dropped without [`CaptureFolder::finish`], it leaves
+/// nothing.
+#[derive(Debug)]
+pub(crate) struct CaptureFolder {
+    dir: PathBuf,
+    staging: TempDir,
+    /// The keys of the lens, from the first view.
+    lens: Value,
+    frames: Vec<Value>,
+}
+
+impl CaptureFolder {
+    /// Starts a folder that will appear at `dir`, which must not exist yet or be empty.
+    pub(crate) fn create(dir: &Path) -> Result<Self, SynthError> {
         if is_occupied(dir) {
             return Err(SynthError::Exists { path: dir.to_owned() });
         }
@@ -27,54 +49,56 @@ impl SynthCapture {
         // Beside the target, so that the rename stays on one file system; gone if we fail.
         let staging =
             tempfile::Builder::new().prefix(".turnlight-synth-").tempdir_in(parent).map_err(io_error(parent))?;
-        let inner = staging.path().join("capture");
-        self.write_all(&inner)?;
+        for sub in ["images", "masks"] {
+            let path = staging.path().join("capture").join(sub);
+            fs::create_dir_all(&path).map_err(io_error(&path))?;
+        }
+        Ok(Self { dir: dir.to_owned(), staging, lens: json!({}), frames: Vec::new() })
+    }
+
+    /// Writes picture and matte of a view lit from the unit direction `light`.
+    pub(crate) fn add(&mut self, view: &View, light: &Vector3<f64>) -> Result<(), SynthError> {
+        let inner = self.inner();
+        write_rgb(&inner.join(image_path(&view.name)), &view.image)?;
+        write_grey(&inner.join(mask_path(&view.name)), &view.matte)?;
+        if self.frames.is_empty() {
+            self.lens = intrinsics(&view.camera);
+        }
+        self.frames.push(json!({
+            "file_path": image_path(&view.name),
+            "mask_path": mask_path(&view.name),
+            "transform_matrix": rows(&opengl_world_from_camera(&view.camera)),
+            "light_direction": [light.x, light.y, light.z],
+        }));
+        Ok(())
+    }
+
+    /// Adds the true surface and `more` documents by name, and makes the folder appear.
+    pub(crate) fn finish(self, mesh: &Mesh, aabb: &Aabb, more: &[(&str, Value)]) -> Result<(), SynthError> {
+        let (inner, dir) = (self.inner(), &self.dir);
+        write_bytes(&inner.join("truth.ply"), &ply(mesh))?;
+        let mut document = self.lens;
+        document["unit"] = json!(1.0);
+        document["aabb"] = json!([aabb.min.coords.as_slice(), aabb.max.coords.as_slice()]);
+        document["frames"] = Value::Array(self.frames);
+        write_json(&inner.join("transforms.json"), &document)?;
+        for (name, document) in more {
+            write_json(&inner.join(name), document)?;
+        }
         if dir.is_dir() {
-            // Empty, as checked above; some systems do not rename over a folder.
+            // Empty, as checked at the start; some systems do not rename over a folder.
             fs::remove_dir(dir).map_err(io_error(dir))?;
         }
         fs::rename(&inner, dir).map_err(io_error(dir))
     }
 
-    fn write_all(&self, dir: &Path) -> Result<(), SynthError> {
-        for sub in ["images", "masks"] {
-            let path = dir.join(sub);
-            fs::create_dir_all(&path).map_err(io_error(&path))?;
-        }
-        for view in &self.views {
-            write_rgb(&dir.join(image_path(&view.name)), &view.image)?;
-            write_grey(&dir.join(mask_path(&view.name)), &view.matte)?;
-        }
-        write_bytes(&dir.join("truth.ply"), &ply(&self.mesh))?;
-        let text = format!("{:#}\n", self.transforms());
-        write_bytes(&dir.join("transforms.json"), text.as_bytes())
-    }
-
-    fn transforms(&self) -> Value {
-        let frames: Vec<Value> = self
-            .views
-            .iter()
-            .zip(&self.light_directions)
-            .map(|(view, light)| {
-                json!({
-                    "file_path": image_path(&view.name),
-                    "mask_path": mask_path(&view.name),
-                    "transform_matrix": rows(&opengl_world_from_camera(&view.camera)),
-                    "light_direction": [light.x, light.y, light.z],
-                })
-            })
-            .collect();
-        let mut document = self.views.first().map_or_else(|| json!({}), |v| intrinsics(&v.camera));
-        let (low, high) = (self.aabb.min, self.aabb.max);
-        document["unit"] = json!(1.0);
-        document["aabb"] = json!([[low.x, low.y, low.z], [high.x, high.y, high.z]]);
-        document["frames"] = Value::Array(frames);
-        document
+    fn inner(&self) -> PathBuf {
+        self.staging.path().join("capture")
     }
 }
 
 /// The shared lens; our pixel centres are at half integers, as nerfstudio's are.
-fn intrinsics(camera: &Camera) -> Value {
+pub(crate) fn intrinsics(camera: &Camera) -> Value {
     let i = camera.intrinsics;
     json!({
         "camera_model": "OPENCV",
@@ -93,7 +117,7 @@ fn opengl_world_from_camera(camera: &Camera) -> Matrix4<f64> {
     m
 }
 
-fn rows(m: &Matrix4<f64>) -> Vec<Vec<f64>> {
+pub(crate) fn rows(m: &Matrix4<f64>) -> Vec<Vec<f64>> {
     m.row_iter().map(|row| row.iter().copied().collect()).collect()
 }
 
@@ -138,6 +162,10 @@ fn encode(path: &Path, bytes: &[u8], width: usize, height: usize, kind: Extended
     image::write_buffer_with_format(&mut out, bytes, width as u32, height as u32, kind, ImageFormat::Png)
         .map_err(|source| SynthError::Encode { path: path.to_owned(), source })?;
     write_bytes(path, out.get_ref())
+}
+
+fn write_json(path: &Path, document: &Value) -> Result<(), SynthError> {
+    write_bytes(path, format!("{document:#}\n").as_bytes())
 }
 
 fn write_bytes(path: &Path, bytes: &[u8]) -> Result<(), SynthError> {

@@ -166,10 +166,10 @@ pub(crate) struct BoardArgs {
     #[arg(long, value_name = "N", default_value = "5", value_parser = whole_factor)]
     pub(crate) rows: usize,
     /// Side of a square; of a marker and its gap where there are no squares
-    #[arg(long, value_name = "LENGTH", default_value = "30mm", value_parser = length)]
+    #[arg(long, value_name = "LENGTH", default_value = "30mm", value_parser = length_with_unit)]
     pub(crate) square: f64,
     /// Side of a marker [default: three quarters of a square]
-    #[arg(long, value_name = "LENGTH", value_parser = length)]
+    #[arg(long, value_name = "LENGTH", value_parser = length_with_unit)]
     pub(crate) marker: Option<f64>,
     /// Whose markers, as in 4x4_50, 5x5_100, 6x6_250, aruco_original, apriltag_36h11
     #[arg(long, default_value = "4x4_50")]
@@ -314,18 +314,35 @@ pub(crate) struct SynthArgs {
     /// The capture to write
     #[arg(short, long, value_name = "DIR")]
     pub(crate) output: PathBuf,
-    /// Number of views
-    #[arg(long, value_name = "N", default_value = "48", value_parser = frames)]
-    pub(crate) views: usize,
+    /// Number of views [default: 48, 150 of a film]
+    #[arg(long, value_name = "N", value_parser = frames)]
+    pub(crate) views: Option<usize>,
     /// Size of the frames
     #[arg(long, value_name = "WxH", default_value = "640x480", value_parser = size)]
     pub(crate) size: [usize; 2],
     /// Seed of everything random
     #[arg(long, default_value = "1")]
     pub(crate) seed: u64,
-    /// Write the frames as a film too (.png .apng: animated; .mp4 .mov .avi .mkv where built with films)
+    #[command(flatten)]
+    pub(crate) footage: FootageArgs,
+}
+
+/// What `synth` films as someone with a phone would.
+#[derive(Debug, Args)]
+pub(crate) struct FootageArgs {
+    /// Film it on a board before a cloth, as with a phone (.mp4 .mov .avi .mkv where built with films; .png .apng:
+    /// animated); the capture is then the film's truth
     #[arg(long, value_name = "FILE")]
     pub(crate) video: Option<PathBuf>,
+    /// Colour of the cloth: green, blue, grey, black
+    #[arg(long, value_name = "COLOUR", default_value = "green", requires = "video")]
+    pub(crate) backdrop: String,
+    /// Full turns of the platter
+    #[arg(long, value_name = "N", default_value = "1.05", requires = "video", value_parser = turns)]
+    pub(crate) turns: f64,
+    /// Frames per second of the film
+    #[arg(long, value_name = "N", default_value = "30", requires = "video", value_parser = rate)]
+    pub(crate) fps: f64,
 }
 
 #[derive(Debug, Args)]
@@ -415,11 +432,15 @@ fn rate(text: &str) -> Result<f64, String> {
     within(text, 0.02, 650.0)
 }
 
+fn turns(text: &str) -> Result<f64, String> {
+    within(text, 0.0, 100.0)
+}
+
 fn dpi(text: &str) -> Result<f64, String> {
     within(text, 30.0, 2400.0)
 }
 
-fn length(text: &str) -> Result<f64, String> {
+fn length_with_unit(text: &str) -> Result<f64, String> {
     parse_length(text).map_err(|fault| fault.to_string())
 }
 

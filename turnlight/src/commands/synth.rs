@@ -6,46 +6,33 @@ use serde_json::json;
 use std::path::Path;
 use turnlight::Error;
 use turnlight::data_synth::{Layout, Scene, SynthCapture, SynthError, SynthOptions, synthesize_with};
-use turnlight::film;
 use turnlight::stages::{Observer, Stages};
 
-/// Frames per second of the film.
-const FPS: f64 = 12.0;
+/// Views, where none are asked for.
+const VIEWS: usize = 48;
 
 pub(crate) fn run(args: &SynthArgs, observer: &dyn Observer) -> Result<Answer, Error> {
+    if let Some(video) = &args.footage.video {
+        return super::synth_film::run(args, video, observer);
+    }
     let scene: Scene = args.scene.parse().map_err(|fault| Error::Arguments(format!("{fault}")))?;
     let [width, height] = args.size;
     refuse_occupied(&args.output)?;
-    args.video.as_deref().map(film::check).transpose()?;
-    let options = SynthOptions {
-        views: args.views,
-        width,
-        height,
-        seed: args.seed,
-        layout: layout(args.views),
-        ..SynthOptions::default()
-    };
+    let views = args.views.unwrap_or(VIEWS);
+    let options =
+        SynthOptions { views, width, height, seed: args.seed, layout: layout(views), ..SynthOptions::default() };
     let mut stages = Stages::new(observer);
     let filmed = film(scene, &options, &mut stages)?;
     stages.run("write", |_| filmed.write(&args.output))?;
-    if let Some(video) = &args.video {
-        let frames: Vec<_> = filmed.views.iter().map(|v| v.image.map(|[r, g, b]| [r, g, b, 255])).collect();
-        stages.run("write film", |_| film::write_film(video, frames, FPS))?;
-    }
-    let mut text =
-        format!("{}: {} views of {width} × {height}\nwrote {}", scene.name(), args.views, args.output.display());
-    if let Some(video) = &args.video {
-        text.push_str(&format!("\nwrote {}", video.display()));
-    }
+    let text = format!("{}: {views} views of {width} × {height}\nwrote {}", scene.name(), args.output.display());
     let json = json!({
         "scene": scene.name(),
-        "views": args.views,
+        "views": views,
         "width": width,
         "height": height,
         "seed": args.seed,
         "noise_rms": filmed.report.noise_rms,
         "capture": args.output,
-        "video": args.video,
         "stages": stages.finished(),
     });
     Ok(Answer { text, json })
