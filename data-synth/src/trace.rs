@@ -141,14 +141,18 @@ impl World {
 
     /// Whether a hit is on the object, not on the set.
     pub(crate) fn is_object(&self, hit: &Hit) -> bool {
-        self.faces[hit.face as usize].part < SET
+        self.part(hit) < SET
     }
 
-    /// Something that differs between parts, and between light and dark of a printed board.
-    pub(crate) fn region(&self, hit: &Hit) -> u16 {
+    /// Which part a hit is on.
+    pub(crate) fn part(&self, hit: &Hit) -> u8 {
+        self.faces[hit.face as usize].part
+    }
+
+    /// Whether a hit is on what is printed dark on the board of the set.
+    pub(crate) fn is_dark(&self, hit: &Hit) -> bool {
         let face = &self.faces[hit.face as usize];
-        let is_dark = |set: &Arc<Set>| set.is_dark(face.position(hit.barycentric), face.part);
-        2 * u16::from(face.part) + u16::from(self.set.as_ref().is_some_and(is_dark))
+        self.set.as_ref().is_some_and(|set| set.is_dark(face.position(hit.barycentric), face.part))
     }
 
     /// What a camera ray meets.
@@ -226,7 +230,8 @@ impl World {
         direction.dot(&self.faces[hit.face as usize].normal) >= 0.0
     }
 
-    fn albedo(&self, hit: Hit, direction: Vec3) -> Vec3 {
+    /// The paint at a hit.
+    pub(crate) fn albedo(&self, hit: Hit, direction: Vec3) -> Vec3 {
         let face = &self.faces[hit.face as usize];
         let position = face.position(hit.barycentric);
         if let Some(set) = self.set.as_ref().filter(|_| face.part >= SET) {

@@ -11,7 +11,7 @@ use std::f64::consts::TAU;
 /// Focal length in longer sides of the frame: the main lens of a phone.
 const FOCAL: f64 = 0.92;
 /// Share of the frame the object may fill, in the direction where it fills more.
-const FILL: f64 = 0.62;
+const FILL: f64 = 0.54;
 /// Most the camera leans to either side, in degrees.
 const ROLL_DEG: f64 = 1.5;
 /// Where the camera looks, in heights of the object.

@@ -56,7 +56,7 @@ pub struct FootageOptions {
     pub fps: f64,
     /// Of everything random; the same seed gives the same bytes.
     pub seed: u64,
-    /// Paths per pixel, 1 to 4096; pixels that show an edge get four times as many.
+    /// Paths per pixel of the object, 1 to 4096; the set gets an eighth.
     pub samples: u32,
     /// Surfaces a path of light may touch, 1 to 1000.
     pub surfaces: usize,
@@ -99,7 +99,7 @@ pub struct Footage {
 }
 
 /// How far the board's edges lie from the axis, in radii of the object's footprint: a ring of squares stays in view.
-const BOARD_SHARE: f64 = 1.6;
+const BOARD_SHARE: f64 = 1.55;
 /// Squares along a side of the board that suits an object.
 const SQUARES: usize = 7;
 /// Off the axis the board's middle lies in shares of its side, as one who puts it there by eye leaves it.
@@ -116,7 +116,7 @@ impl Default for FootageOptions {
             height: 720,
             fps: 30.0,
             seed: 0,
-            samples: 8,
+            samples: 16,
             surfaces: 4,
             turns: 1.05,
             unsteadiness: 0.05,

@@ -15,8 +15,10 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 /// Parts from here on belong to the set.
 pub(crate) const SET: u8 = 200;
 const CARD: u8 = SET;
-const PLATTER: u8 = SET + 1;
-const ROOM: u8 = SET + 2;
+const CARD_SIDE: u8 = SET + 1;
+const PLATTER: u8 = SET + 2;
+const PLATTER_SIDE: u8 = SET + 3;
+const ROOM: u8 = SET + 4;
 
 /// Points around surfaces of revolution.
 const AROUND: usize = 160;
@@ -71,11 +73,9 @@ impl Set {
 
     /// Everything, facing inward where it surrounds.
     pub(crate) fn build(&self) -> MeshBuilder {
-        let mut b = MeshBuilder { part: CARD, ..MeshBuilder::default() };
+        let mut b = MeshBuilder::default();
         self.card(&mut b);
-        b.part = PLATTER;
         let table = self.platter(&mut b);
-        b.part = ROOM;
         self.room(&mut b, table);
         b
     }
@@ -87,8 +87,10 @@ impl Set {
         let corners = [[left, near], [right, near], [right, far], [left, far]];
         let at = |z: f64| corners.map(|[x, y]| (self.world_from_board * Point3::new(x, y, z)).coords.into());
         let (low, high) = (b.ring(at(-CARD_THICKNESS)), b.ring(at(0.0)));
+        b.part = CARD_SIDE;
         b.cap_reversed(&low);
         b.walls(&low, &high);
+        b.part = CARD;
         b.cap(&high);
     }
 
@@ -100,7 +102,9 @@ impl Set {
         let profile =
             [(0.6 * r, table), (0.6 * r, rim), (r - bevel, rim), (r, rim + bevel), (r, top - bevel), (r - bevel, top)];
         let rings: Vec<_> = profile.iter().map(|&(r, z)| b.ring(circle(r, z))).collect();
+        b.part = PLATTER_SIDE;
         b.loft(&rings);
+        b.part = PLATTER;
         b.cap(&rings[rings.len() - 1]);
         table
     }
@@ -113,6 +117,7 @@ impl Set {
             let (s, c) = (FRAC_PI_2 * f64::from(k) / 24.0).sin_cos();
             rings.push(b.ring(at(WALL - COVE * (1.0 - c), COVE * (1.0 - s))));
         }
+        b.part = ROOM;
         b.loft(&rings);
         b.cap(&rings[rings.len() - 1]);
     }
@@ -120,8 +125,8 @@ impl Set {
     /// Reflectance at a point in the world, the room turned by `yaw` radians.
     pub(crate) fn albedo(&self, p: Vec3, part: u8, yaw: f32) -> Vec3 {
         match part {
-            CARD => self.card_albedo(p, part),
-            PLATTER => color([112, 112, 114]) * (0.9 + 0.2 * noise(p * 900.0, 3)),
+            CARD | CARD_SIDE => self.card_albedo(p, part),
+            PLATTER | PLATTER_SIDE => color([112, 112, 114]) * (0.9 + 0.2 * noise(p * 900.0, 3)),
             _ => {
                 let (s, c) = yaw.sin_cos();
                 let q = Vec3::new(c * p.x + s * p.y, c * p.y - s * p.x, p.z) / self.length as f32;
@@ -141,8 +146,7 @@ impl Set {
     /// Whether a point of the set is printed dark.
     pub(crate) fn is_dark(&self, p: Vec3, part: u8) -> bool {
         let on_board = self.world_from_board.inverse_transform_point(&Point3::from(p.cast::<f64>()));
-        // The sides of the card are paper.
-        part == CARD && on_board.z > -0.1 * CARD_THICKNESS && self.board.is_dark(Point2::new(on_board.x, on_board.y))
+        part == CARD && self.board.is_dark(Point2::new(on_board.x, on_board.y))
     }
 
     /// Cloth, table or wall at a point of the room, in lengths of the set.
@@ -161,14 +165,14 @@ impl Set {
     fn cloth(&self, q: Vec3) -> Vec3 {
         // Over the table and up the wall, the length of the cloth.
         let along = q.z - q.x;
-        let soft = fractal(Vec3::new(0.35 * along, 0.9 * q.y, 0.0), 3, 21) - 0.5;
-        let rumpled = fractal(Vec3::new(2.3 * along + 1.5 * soft, 1.6 * q.y, 4.0), 4, 22) - 0.5;
+        let soft = fractal(Vec3::new(0.35 * along, 0.9 * q.y, 0.0), 2, 21) - 0.5;
+        let rumpled = fractal(Vec3::new(2.3 * along + 1.5 * soft, 1.6 * q.y, 4.0), 3, 22) - 0.5;
         let bent = 0.12 * (noise(q * 1.1, 23) - 0.5);
         let crease = |x: f32| stripe(x - 0.02, 0.012, 0.03) - stripe(x + 0.02, 0.012, 0.03);
         let creases = crease(wrap(q.y + bent + 0.9, 2.6)) + crease(wrap(along + bent + 0.4, 2.6));
         let worn = 0.5 + 0.5 * noise(q * 0.8, 24);
         let weave = noise(q * 160.0, 25) - 0.5;
-        let shade = 1.0 + 0.30 * soft + 0.22 * rumpled + 0.10 * worn * creases + 0.10 * weave;
+        let shade = 1.0 + 0.45 * soft + 0.35 * rumpled + 0.16 * worn * creases + 0.10 * weave;
         // What light bleaches turns a little paler.
         blend(self.backdrop, Vec3::repeat(0.35), 0.04 * worn) * shade.max(0.2)
     }
@@ -213,13 +217,14 @@ mod tests {
             let towards = Vector3::new(0.0, 0.0, 0.5) - middle;
             assert!(mesh.face_area_vector(f).dot(&towards) > 0.0, "face {f} of part {part} at {middle}");
         }
-        let volume = |wanted: u8| {
-            let faces = parts.iter().zip(&mesh.faces).filter(|(part, _)| **part == wanted).map(|(_, f)| *f).collect();
+        let volume = |wanted: [u8; 2]| {
+            let chosen = parts.iter().zip(&mesh.faces).filter(|(part, _)| wanted.contains(part));
+            let faces = chosen.map(|(_, face)| *face).collect();
             geometry::Mesh { positions: mesh.positions.clone(), faces }.signed_volume()
         };
         let [width, depth] = Board::default().size().map(|side| side + 4.0 * Board::default().quiet_zone());
-        assert!((volume(CARD) / (width * depth * CARD_THICKNESS) - 1.0).abs() < 1e-3);
-        assert!(volume(PLATTER) > 0.0);
+        assert!((volume([CARD, CARD_SIDE]) / (width * depth * CARD_THICKNESS) - 1.0).abs() < 1e-3);
+        assert!(volume([PLATTER, PLATTER_SIDE]) > 0.0);
     }
 
     #[test]

@@ -76,7 +76,7 @@ fn mean(view: &View, keep: impl Fn(usize, usize, u8) -> bool) -> [f64; 3] {
 #[test]
 fn the_cloth_fills_the_background_and_spills_on_the_object() {
     let frame = |backdrop: Backdrop| {
-        let options = FootageOptions { backdrop, samples: 8, ..ideal() };
+        let options = FootageOptions { backdrop, samples: 64, ..ideal() };
         set_up(Scene::Temple, &options).unwrap().frame(1)
     };
     let [green, blue, grey] = [Backdrop::Green, Backdrop::Blue, Backdrop::Grey].map(frame);
