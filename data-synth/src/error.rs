@@ -59,4 +59,12 @@ pub enum SynthError {
         /// What the encoder said.
         source: image::ImageError,
     },
+    /// Maps could not be encoded.
+    #[error("{path}: {source}", path = path.display())]
+    Maps {
+        /// The file.
+        path: PathBuf,
+        /// What the encoder said.
+        source: exr::error::Error,
+    },
 }

@@ -27,6 +27,8 @@ const BATCHES: u32 = 4;
 /// The square of the error falls as this power of the number of samples: faster than the first, for more
 /// samples are stratified finer (measured on the temple between 16 and 128: 1.08 to 1.1).
 const GAIN: f64 = 1.08;
+/// Aimed at below the noise asked for: a pilot may err by so much.
+const MARGIN: f64 = 0.97;
 /// Fewest and most samples of a pixel, where they are shared out.
 const SHARED_OUT: [f64; 2] = [8.0, 4096.0];
 
@@ -274,9 +276,10 @@ impl<'a> Shot<'a> {
         let error = self.by_pixel(|x, y| if covers.at(x, y).share() > 0.0 { around(x, y) } else { 0.0 });
         let judged = |(e, c): (&f64, &Cover)| (c.share() >= 0.5).then_some(*e);
         let object: Vec<f64> = error.pixels().iter().zip(covers.pixels()).filter_map(judged).collect();
-        // With n_i = c e_i samples and errors that fall as n^−g, the mean of e_i² (PILOT/n_i)^g is levels².
+        // With n_i = c e_i samples and errors that fall as n^−g, the mean of e_i² (PILOT/n_i)^g is the aim squared.
         let mean = object.iter().map(|e| e.powf(2.0 - GAIN)).sum::<f64>() / object.len().max(1) as f64;
-        let scale = f64::from(PILOT) * (mean / (levels * levels)).powf(1.0 / GAIN);
+        let aim = MARGIN * levels;
+        let scale = f64::from(PILOT) * (mean / (aim * aim)).powf(1.0 / GAIN);
         let count = |e: f64| ((e * scale).clamp(SHARED_OUT[0], SHARED_OUT[1]) as u32).next_multiple_of(BATCHES);
         let samples = self.by_pixel(|x, y| if covers.at(x, y).share() > 0.0 { count(error.at(x, y)) } else { 0 });
         (samples, pilot.pixels().iter().map(|s| s.rays).sum())

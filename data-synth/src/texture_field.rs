@@ -12,16 +12,14 @@ pub(crate) fn noise(p: Vec3, seed: u32) -> f32 {
         towards_zero - i32::from(towards_zero as f32 > c)
     });
     let f = (p - cell.map(|c| c as f32)).map(smoothstep);
-    let next = |hash: u32, c: i32| [mix(hash ^ c as u32), mix(hash ^ c.wrapping_add(1) as u32)];
-    let along_x = |[a, b]: [u32; 2]| lerp(unit(a), unit(b), f.x);
-    // Hashes of the corners share those of the edges they lie on.
-    let [near, far] = [cell.x, cell.x.wrapping_add(1)].map(|x| next(mix(x as u32 ^ seed), cell.y));
-    let ends = |y: usize| {
-        let (a, b) = (next(near[y], cell.z), next(far[y], cell.z));
-        [along_x([a[0], b[0]]), along_x([a[1], b[1]])]
-    };
-    let ([a, b], [c, d]) = (ends(0), ends(1));
-    lerp(lerp(a, c, f.y), lerp(b, d, f.y), f.z)
+    // One number per lattice point, a step along an axis adding that axis' constant (odd, of no pattern).
+    const STEPS: [u32; 3] = [0x8da6_b343, 0xd816_3841, 0xcb1a_b31f];
+    let [x, y, z] = [0, 1, 2].map(|axis| (cell[axis] as u32).wrapping_mul(STEPS[axis]));
+    let corner = x.wrapping_add(y).wrapping_add(z).wrapping_add(seed.wrapping_mul(0x9e37_79b9));
+    let value = |corner: u32| unit(mix(corner));
+    let along_x = |corner: u32| lerp(value(corner), value(corner.wrapping_add(STEPS[0])), f.x);
+    let along_y = |corner: u32| lerp(along_x(corner), along_x(corner.wrapping_add(STEPS[1])), f.y);
+    lerp(along_y(corner), along_y(corner.wrapping_add(STEPS[2])), f.z)
 }
 
 /// Sum of `octaves` of noise, each twice as fine and half as strong, scaled to [0, 1].
@@ -68,4 +66,25 @@ pub(crate) fn color(srgb: [u8; 3]) -> Vec3 {
 /// Mixes two colours.
 pub(crate) fn blend(a: Vec3, b: Vec3, t: f32) -> Vec3 {
     a + (b - a) * t
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn noise_is_continuous_and_neither_flat_nor_the_same_everywhere() {
+        let mut values = Vec::new();
+        for i in 0..2000 {
+            let r = |k: u32| unit(mix(7 * i + k)) * 40.0 - 20.0;
+            let p = Vec3::new(r(0).round(), r(1), r(2));
+            // Across the border of a cell, below zero too.
+            let across = noise(p + Vec3::x() * 1e-3, 3) - noise(p - Vec3::x() * 1e-3, 3);
+            assert!(across.abs() < 1e-4, "{across} at {p}");
+            values.push(f64::from(noise(Vec3::new(r(3), r(4), r(5)), 3)));
+        }
+        let mean = values.iter().sum::<f64>() / 2000.0;
+        let sigma = (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / 2000.0).sqrt();
+        assert!((mean - 0.5).abs() < 0.02 && (0.1..0.25).contains(&sigma), "{mean} ± {sigma}");
+    }
 }

@@ -1,9 +1,16 @@
-//! A synthetic capture as a folder: `transforms.json` (nerfstudio convention), `images/`, `masks/`,
-//! and the true surface as `truth.ply`. The folder appears whole or not at all.
+//! A synthetic capture as a folder: `transforms.json` (nerfstudio convention), `images/`, `masks/`, and
+//! beside it what a capture does not know: the true surface as `truth.ply`, true cameras and exposures as
+//! `truth.json`, and on request what each view shows by pixel as `truth/NNNN.exr`. The folder appears whole
+//! or not at all.
+//!
+//! Channels of the EXR files: `R G B` mean radiance (linear sRGB, white at 1, object on black), `A` coverage,
+//! `Z` distance along the optical axis in metres (infinite off the object), `NX NY NZ` the unit normal in the
+//! world, `noise` the renderer's standard error in levels of 255 of sRGB. 32-bit floats.
 
 use crate::error::SynthError;
-use crate::synth::SynthCapture;
+use crate::synth::{SynthCapture, TruthMaps};
 use capture::{Aabb, Camera, Image, View};
+use exr::prelude::{AnyChannel, AnyChannels, FlatSamples, Vec2, WritableImage};
 use geometry::Mesh;
 use image::{ExtendedColorType, ImageFormat};
 use nalgebra::{Matrix4, Vector3};
@@ -23,7 +30,10 @@ impl SynthCapture {
         for (view, light) in self.views.iter().zip(&self.light_directions) {
             folder.add(view, light)?;
         }
-        folder.finish(&self.mesh, &self.aabb, &[])
+        for (view, truth) in self.views.iter().zip(&self.truths) {
+            truth.maps.as_ref().map(|maps| folder.add_maps(&view.name, maps)).transpose()?;
+        }
+        folder.finish(&self.mesh, &self.aabb, &self.truth())
     }
 }
 
@@ -73,8 +83,14 @@ impl CaptureFolder {
         Ok(())
     }
 
-    /// Adds the true surface and `more` documents by name, and makes the folder appear.
-    pub(crate) fn finish(self, mesh: &Mesh, aabb: &Aabb, more: &[(&str, Value)]) -> Result<(), SynthError> {
+    fn add_maps(&self, name: &str, maps: &TruthMaps) -> Result<(), SynthError> {
+        let folder = self.inner().join("truth");
+        fs::create_dir_all(&folder).map_err(io_error(&folder))?;
+        write_maps(&self.inner().join(truth_path(name)), maps)
+    }
+
+    /// Adds the true surface and what `truth.json` says, and makes the folder appear.
+    pub(crate) fn finish(self, mesh: &Mesh, aabb: &Aabb, truth: &Value) -> Result<(), SynthError> {
         let (inner, dir) = (self.inner(), &self.dir);
         write_bytes(&inner.join("truth.ply"), &ply(mesh))?;
         let mut document = self.lens;
@@ -82,9 +98,7 @@ impl CaptureFolder {
         document["aabb"] = json!([aabb.min.coords.as_slice(), aabb.max.coords.as_slice()]);
         document["frames"] = Value::Array(self.frames);
         write_json(&inner.join("transforms.json"), &document)?;
-        for (name, document) in more {
-            write_json(&inner.join(name), document)?;
-        }
+        write_json(&inner.join("truth.json"), truth)?;
         if dir.is_dir() {
             // Empty, as checked at the start; some systems do not rename over a folder.
             fs::remove_dir(dir).map_err(io_error(dir))?;
@@ -95,6 +109,41 @@ impl CaptureFolder {
     fn inner(&self) -> PathBuf {
         self.staging.path().join("capture")
     }
+}
+
+impl SynthCapture {
+    /// What faults hide: the cameras that took the views, and how bright each came out.
+    fn truth(&self) -> Value {
+        let frame = |(view, truth): (&View, &crate::synth::ViewTruth)| {
+            json!({
+                "file_path": image_path(&view.name),
+                "transform_matrix": rows(&opengl_world_from_camera(&truth.camera)),
+                "exposure": truth.exposure,
+                "maps": truth.maps.is_some().then(|| truth_path(&view.name)),
+            })
+        };
+        json!({
+            "scene": self.scene.name(),
+            "noise_rms_levels": self.report.noise_rms,
+            "frames": self.views.iter().zip(&self.truths).map(frame).collect::<Vec<_>>(),
+        })
+    }
+}
+
+fn write_maps(path: &Path, maps: &TruthMaps) -> Result<(), SynthError> {
+    let size = Vec2(maps.depth.width(), maps.depth.height());
+    let plane = |name: &str, values: Vec<f32>| AnyChannel::new(name, FlatSamples::F32(values));
+    let of = |image: &Image<[f32; 3]>, k: usize| image.pixels().iter().map(|p| p[k]).collect();
+    let scalar = |image: &Image<f32>| image.pixels().to_vec();
+    let mut channels =
+        vec![plane("A", scalar(&maps.coverage)), plane("Z", scalar(&maps.depth)), plane("noise", scalar(&maps.noise))];
+    for (k, [color, normal]) in [["R", "NX"], ["G", "NY"], ["B", "NZ"]].into_iter().enumerate() {
+        channels.extend([plane(color, of(&maps.radiance, k)), plane(normal, of(&maps.normal, k))]);
+    }
+    let image = exr::prelude::Image::from_channels(size, AnyChannels::sort(channels.into_iter().collect()));
+    let mut out = std::io::Cursor::new(Vec::new());
+    image.write().to_buffered(&mut out).map_err(|source| SynthError::Maps { path: path.to_owned(), source })?;
+    write_bytes(path, out.get_ref())
 }
 
 /// The shared lens; our pixel centres are at half integers, as nerfstudio's are.
@@ -109,7 +158,7 @@ pub(crate) fn intrinsics(camera: &Camera) -> Value {
 }
 
 /// Camera to world with OpenGL axes (y up, z back).
-fn opengl_world_from_camera(camera: &Camera) -> Matrix4<f64> {
+pub(crate) fn opengl_world_from_camera(camera: &Camera) -> Matrix4<f64> {
     let flip = nalgebra::Matrix3::from_diagonal(&Vector3::new(1.0, -1.0, -1.0));
     let mut m = Matrix4::identity();
     m.fixed_view_mut::<3, 3>(0, 0).copy_from(&(camera.rotation.transpose() * flip));
@@ -141,12 +190,16 @@ fn ply(mesh: &Mesh) -> Vec<u8> {
     bytes
 }
 
-fn image_path(name: &str) -> String {
+pub(crate) fn image_path(name: &str) -> String {
     format!("images/{name}.png")
 }
 
 fn mask_path(name: &str) -> String {
     format!("masks/{name}.png")
+}
+
+fn truth_path(name: &str) -> String {
+    format!("truth/{name}.exr")
 }
 
 fn write_rgb(path: &Path, image: &Image<[u8; 3]>) -> Result<(), SynthError> {
@@ -211,6 +264,44 @@ mod tests {
         // Nothing is left beside it, and nothing is overwritten.
         assert_eq!(fs::read_dir(root.path().join("deep")).unwrap().count(), 1);
         assert!(matches!(capture.write(&dir), Err(SynthError::Exists { .. })));
+    }
+
+    #[test]
+    fn maps_come_back_from_their_file() {
+        use exr::prelude::{ReadChannels, ReadLayers, read};
+        let capture = small();
+        let options = SynthOptions {
+            views: 1,
+            width: 32,
+            height: 24,
+            effort: Effort::Samples(4),
+            maps: true,
+            ..SynthOptions::default()
+        };
+        let with_maps = synthesize(Scene::Temple, &options).unwrap();
+        let root = tempfile::tempdir().unwrap();
+        capture.write(root.path().join("without")).unwrap();
+        assert!(!root.path().join("without/truth").exists());
+        with_maps.write(root.path().join("with")).unwrap();
+        let path = root.path().join("with/truth/0000.exr");
+        let image = read().no_deep_data().largest_resolution_level().all_channels().first_valid_layer();
+        let image = image.all_attributes().from_file(path).unwrap();
+        let depth = image.layer_data.channel_data.list.iter().find(|c| c.name == *"Z").unwrap();
+        let written = with_maps.truths[0].maps.as_ref().unwrap();
+        let read: Vec<f32> = depth.sample_data.values_as_f32().collect();
+        assert_eq!(read, written.depth.pixels());
+        // What is met lies where the camera stands off the object, with a unit normal that faces it.
+        let camera = with_maps.truths[0].camera;
+        for (y, x) in (0..24).flat_map(|y| (0..32).map(move |x| (y, x))) {
+            let (z, n) = (written.depth.at(x, y), Vector3::from(written.normal.at(x, y)).cast::<f64>());
+            if z.is_finite() {
+                let ray = camera.ray(nalgebra::Point2::new(x as f64 + 0.5, y as f64 + 0.5)).unwrap();
+                assert!((n.norm() - 1.0).abs() < 1e-5 && n.dot(&ray.direction) <= 0.0);
+                let p = ray.origin + ray.direction * (f64::from(z) / ray.direction.dot(&camera.forward()));
+                assert!(with_maps.aabb.min.iter().zip(p.iter()).all(|(low, p)| *p > low - 1e-5));
+                assert!(with_maps.aabb.max.iter().zip(p.iter()).all(|(high, p)| *p < high + 1e-5));
+            }
+        }
     }
 
     #[test]

@@ -448,7 +448,7 @@ fn films_are_written_where_the_build_can() {
     if cfg!(feature = "video") {
         assert_eq!((run.code, run.stderr.as_str()), (Some(0), ""));
         assert!(fs::read(place.path().join("film.mp4")).expect("a film")[4..].starts_with(b"ftyp"));
-        assert!(place.path().join("capture/footage.json").exists());
+        assert!(place.path().join("capture/truth.json").exists());
         fs::remove_dir_all(place.path().join("capture")).expect("our own folder");
         let odd = ["synth", "temple", "-o", "capture", "--size", "33x24", "--video", "odd.mp4"];
         assert!(turnlight(place.path(), &odd).stderr.contains("32x24"));

@@ -166,10 +166,10 @@ pub(crate) struct BoardArgs {
     #[arg(long, value_name = "N", default_value = "5", value_parser = whole_factor)]
     pub(crate) rows: usize,
     /// Side of a square; of a marker and its gap where there are no squares
-    #[arg(long, value_name = "LENGTH", default_value = "30mm", value_parser = length_with_unit)]
+    #[arg(long, value_name = "LENGTH", default_value = "30mm", value_parser = length)]
     pub(crate) square: f64,
     /// Side of a marker [default: three quarters of a square]
-    #[arg(long, value_name = "LENGTH", value_parser = length_with_unit)]
+    #[arg(long, value_name = "LENGTH", value_parser = length)]
     pub(crate) marker: Option<f64>,
     /// Whose markers, as in 4x4_50, 5x5_100, 6x6_250, aruco_original, apriltag_36h11
     #[arg(long, default_value = "4x4_50")]
@@ -248,7 +248,7 @@ pub(crate) struct InfoArgs {
     #[arg(long, value_name = "MESH")]
     pub(crate) truth: Option<PathBuf>,
     /// Distance up to which the truth counts as covered, in the mesh's unit [default: 1 % of the truth's diagonal]
-    #[arg(long, value_name = "LENGTH", requires = "truth", value_parser = length)]
+    #[arg(long, value_name = "LENGTH", requires = "truth", value_parser = tolerance)]
     pub(crate) tolerance: Option<f64>,
     /// Find silhouettes in the photographs even where masks are given
     #[arg(long)]
@@ -325,6 +325,10 @@ pub(crate) struct SynthArgs {
     pub(crate) seed: u64,
     #[command(flatten)]
     pub(crate) footage: FootageArgs,
+    #[command(flatten)]
+    pub(crate) filming: FilmingArgs,
+    #[command(flatten)]
+    pub(crate) faults: FaultArgs,
 }
 
 /// What `synth` films as someone with a phone would.
@@ -337,12 +341,81 @@ pub(crate) struct FootageArgs {
     /// Colour of the cloth: green, blue, grey, black
     #[arg(long, value_name = "COLOUR", default_value = "green", requires = "video")]
     pub(crate) backdrop: String,
-    /// Full turns of the platter
-    #[arg(long, value_name = "N", default_value = "1.05", requires = "video", value_parser = turns)]
-    pub(crate) turns: f64,
     /// Frames per second of the film
     #[arg(long, value_name = "N", default_value = "30", requires = "video", value_parser = rate)]
     pub(crate) fps: f64,
+}
+
+/// How a scene is filmed.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Filming")]
+pub(crate) struct FilmingArgs {
+    /// What the light is fixed to: the room, as on a turntable, or the object
+    #[arg(long, default_value = "room", conflicts_with = "video")]
+    pub(crate) light: LightArg,
+    /// Where the cameras stand: on rings, on a spiral that climbs, or at random above the table
+    #[arg(long, default_value = "rings", conflicts_with = "video")]
+    pub(crate) layout: LayoutArg,
+    /// Elevations in degrees: of the rings; of a film; of the spiral's ends; the lowest of random cameras
+    #[arg(long, value_name = "DEG,..", value_delimiter = ',', allow_negative_numbers = true)]
+    pub(crate) elevations: Option<Vec<f64>>,
+    /// Full turns of the spiral, or of the film [default: 5, 1.05 of a film]
+    #[arg(long, value_name = "N", value_parser = turns)]
+    pub(crate) turns: Option<f64>,
+    /// Paths of light per pixel [default: 8, 16 of a film]
+    #[arg(long, value_name = "N", value_parser = samples)]
+    pub(crate) samples: Option<u32>,
+    /// Trace as many paths as it takes for this noise over the object, in levels of 255 (instead of --samples)
+    #[arg(long, value_name = "LEVELS", value_parser = levels, conflicts_with_all = ["samples", "video"])]
+    pub(crate) noise: Option<f64>,
+    /// Write radiance, depth, normals and noise of every view as truth/NNNN.exr
+    #[arg(long, conflicts_with = "video")]
+    pub(crate) maps: bool,
+}
+
+/// What goes wrong; nothing unless asked for, in a film what a phone does.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Faults")]
+pub(crate) struct FaultArgs {
+    /// Noise of a sensor that is white at this many electrons, with ten of read noise (a phone: 5000)
+    #[arg(long, value_name = "ELECTRONS")]
+    pub(crate) sensor_noise: Option<f64>,
+    /// Exposure that drifts from view to view by so many stops (standard deviation)
+    #[arg(long, value_name = "STOPS")]
+    pub(crate) exposure_drift: Option<f64>,
+    /// Cameras that stand and point off by so many degrees (standard deviation), and are known
+    #[arg(long, value_name = "DEG", default_value = "0", conflicts_with = "video")]
+    pub(crate) jitter: f64,
+    /// Cameras written with an error of so many pixels (standard deviation)
+    #[arg(long, value_name = "PX", default_value = "0", conflicts_with = "video")]
+    pub(crate) calibration_error: f64,
+    /// Masks grown by so many pixels; negative shrinks
+    #[arg(long, value_name = "PX", default_value = "0", allow_negative_numbers = true, conflicts_with = "video")]
+    pub(crate) mask_grow: f64,
+    /// Round holes in every mask
+    #[arg(long, value_name = "N", default_value = "0", conflicts_with = "video")]
+    pub(crate) mask_holes: usize,
+    /// Turn of the table while the shutter is open, in degrees
+    #[arg(long, value_name = "DEG", default_value = "0")]
+    pub(crate) motion_blur: f64,
+    /// Radial distortion k1 of the lens, known
+    #[arg(long, value_name = "K1", allow_negative_numbers = true)]
+    pub(crate) distortion: Option<f64>,
+}
+
+/// What the light is fixed to.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(crate) enum LightArg {
+    Room,
+    Object,
+}
+
+/// How cameras are spread.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(crate) enum LayoutArg {
+    Rings,
+    Spiral,
+    Hemisphere,
 }
 
 #[derive(Debug, Args)]
@@ -423,24 +496,28 @@ fn pixels(text: &str) -> Result<f64, String> {
     within(text, 0.0, 1000.0)
 }
 
-fn length(text: &str) -> Result<f64, String> {
+fn tolerance(text: &str) -> Result<f64, String> {
     let value = text.parse().ok().filter(|value: &f64| value.is_finite() && *value >= 0.0);
     value.ok_or_else(|| "needs a length of 0 or more, in the mesh's unit".to_owned())
+}
+
+fn turns(text: &str) -> Result<f64, String> {
+    within(text, 0.01, 1000.0)
+}
+
+fn levels(text: &str) -> Result<f64, String> {
+    within(text, 0.05, 64.0)
 }
 
 fn rate(text: &str) -> Result<f64, String> {
     within(text, 0.02, 650.0)
 }
 
-fn turns(text: &str) -> Result<f64, String> {
-    within(text, 0.0, 100.0)
-}
-
 fn dpi(text: &str) -> Result<f64, String> {
     within(text, 30.0, 2400.0)
 }
 
-fn length_with_unit(text: &str) -> Result<f64, String> {
+fn length(text: &str) -> Result<f64, String> {
     parse_length(text).map_err(|fault| fault.to_string())
 }
 

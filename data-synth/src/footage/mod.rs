@@ -217,6 +217,10 @@ fn laid_out(board: Board, height: f64, options: &FootageOptions) -> Set {
     Set::new(board, middle, 0.5 * uniform(2), height, options.backdrop)
 }
 
+fn frame_name(frame: usize) -> String {
+    format!("{frame:04}")
+}
+
 impl Footage {
     /// Number of frames.
     pub fn frames(&self) -> usize {
@@ -277,7 +281,7 @@ impl Footage {
         let image = develop(&shot.radiance, self.exposure(frame), options.sensor_noise, options.seed, frame);
         View {
             index: frame,
-            name: format!("{frame:04}"),
+            name: frame_name(frame),
             image,
             matte: shot.coverage.map(|c| (c * 255.0).round() as u8),
             is_complete: true,

@@ -119,11 +119,11 @@ fn the_folder_is_a_capture_with_the_truth_of_the_film() {
     let (read, true_camera) = (capture.frames[1].camera, footage.cameras()[1]);
     assert!((read.center() - true_camera.center()).norm() < 1e-12);
     assert_eq!(read.intrinsics, true_camera.intrinsics);
-    let text = std::fs::read_to_string(dir.join("footage.json")).unwrap();
+    let text = std::fs::read_to_string(dir.join("truth.json")).unwrap();
     let truth: serde_json::Value = serde_json::from_str(&text).unwrap();
     assert_eq!(truth["board"]["text"].as_str().unwrap().parse::<Board>().unwrap(), *footage.board());
-    assert!((truth["angles_deg"][1].as_f64().unwrap() - 378.0).abs() < 1e-9);
-    assert!((truth["times_s"][1].as_f64().unwrap() - 1.0 / 30.0).abs() < 1e-12);
+    assert!((truth["frames"][1]["angle_deg"].as_f64().unwrap() - 378.0).abs() < 1e-9);
+    assert!((truth["frames"][1]["time_s"].as_f64().unwrap() - 1.0 / 30.0).abs() < 1e-12);
     assert!(matches!(TruthFolder::create(&footage, &dir), Err(SynthError::Exists { .. })));
 }
 

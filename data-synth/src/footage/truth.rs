@@ -1,8 +1,9 @@
-//! The truth beside a film: a capture folder as any synthetic one, and `footage.json` with what a capture cannot say.
+//! The truth beside a film: a capture folder as any synthetic one, and in its `truth.json` what a
+//! capture cannot say.
 
-use super::Footage;
+use super::{Footage, frame_name};
 use crate::error::SynthError;
-use crate::write::{CaptureFolder, intrinsics, rows};
+use crate::write::{CaptureFolder, image_path, intrinsics, opengl_world_from_camera, rows};
 use capture::View;
 use serde_json::{Value, json};
 use std::path::Path;
@@ -38,17 +39,23 @@ impl<'a> TruthFolder<'a> {
     /// Names the file that could not be written.
     pub fn finish(self) -> Result<(), SynthError> {
         let Self { footage, folder } = self;
-        folder.finish(&footage.mesh, &footage.aabb, &[("footage.json", footage.document())])
+        folder.finish(&footage.mesh, &footage.aabb, &footage.truth())
     }
 }
 
 impl Footage {
-    /// What `footage.json` says; `docs/synthetic-footage.md` says what it means.
-    pub fn document(&self) -> Value {
+    /// What `truth.json` says; `docs/synthetic-footage.md` says what it means.
+    pub fn truth(&self) -> Value {
         let options = &self.options;
-        let angles: Vec<f64> = self.angles.iter().map(|angle| angle.to_degrees()).collect();
-        let times: Vec<f64> = (0..options.frames).map(|k| k as f64 / options.fps).collect();
-        let exposures: Vec<f64> = (0..options.frames).map(|k| self.exposure(k)).collect();
+        let frame = |k: usize| {
+            json!({
+                "file_path": image_path(&frame_name(k)),
+                "transform_matrix": rows(&opengl_world_from_camera(&self.cameras[k])),
+                "time_s": k as f64 / options.fps,
+                "angle_deg": self.angles[k].to_degrees(),
+                "exposure": self.exposure(k),
+            })
+        };
         let noise = options
             .sensor_noise
             .map(|noise| json!({ "full_well": noise.full_well, "read_electrons": noise.read_electrons }));
@@ -56,9 +63,7 @@ impl Footage {
             "scene": self.scene.name(),
             "seed": options.seed,
             "fps": options.fps,
-            "times_s": times,
             "axis": { "point": [0.0, 0.0, 0.0], "direction": [0.0, 0.0, 1.0] },
-            "angles_deg": angles,
             "turns": options.turns,
             "unsteadiness": options.unsteadiness,
             "elevation_deg": options.elevation_deg,
@@ -69,8 +74,8 @@ impl Footage {
             "backdrop": options.backdrop.name(),
             "lens": self.cameras.first().map(intrinsics),
             "sensor_noise": noise,
-            "exposures": exposures,
             "motion_blur_deg": options.motion_blur_deg,
+            "frames": (0..options.frames).map(frame).collect::<Vec<_>>(),
         })
     }
 }

@@ -2,11 +2,12 @@
 //! "Distance functions"), under a glaze. Built in a frame where the elephant is about 1.6 long and
 //! looks along +x, then scaled to the desk.
 
+use super::clay::{chain, ellipsoid, smooth_min};
 use crate::isosurface::{Grid, extract};
 use crate::material::{Finish, Vec3};
-use crate::shape::MeshBuilder;
+use crate::shape::{MeshBuilder, P};
 use crate::texture_field::{blend, color, fractal, noise, step, stripe, wrap};
-use nalgebra::{Point3, Vector3};
+use nalgebra::Point3;
 
 const BODY: u8 = 0;
 const TUSK: u8 = 1;
@@ -23,8 +24,6 @@ const SCALE: f64 = 0.13;
 const CELLS: f64 = 52.0;
 /// Where the body's middle lies along x: put onto the turntable's axis.
 const MIDDLE: f64 = 0.19;
-
-type P = Vector3<f64>;
 
 /// Builds the mesh.
 pub(crate) fn build() -> MeshBuilder {
@@ -140,31 +139,6 @@ fn ear(q: P) -> f64 {
     // A slab with a round rim, thicker than the cells of the mesh (Quilez' extrusion).
     let side = cup.abs() - 0.006;
     outline.max(side).min(0.0) + outline.max(0.0).hypot(side.max(0.0)) - 0.022
-}
-
-/// An approximate distance with the right sign and the right slope at the surface.
-fn ellipsoid(p: P, center: P, radii: P) -> f64 {
-    let r = p - center;
-    let k0 = r.component_div(&radii).norm();
-    let k1 = r.component_div(&radii.component_mul(&radii)).norm();
-    if k1 > 1e-9 { k0 * (k0 - 1.0) / k1 } else { -radii.min() }
-}
-
-/// Cones of linearly changing radius along a polyline of (x, y, z, radius), joined with softness `k`.
-fn chain(p: P, points: &[(f64, f64, f64, f64)], k: f64) -> f64 {
-    let cone = |w: &[(f64, f64, f64, f64)]| {
-        let (a, b) = (P::new(w[0].0, w[0].1, w[0].2), P::new(w[1].0, w[1].1, w[1].2));
-        let axis = b - a;
-        let t = ((p - a).dot(&axis) / axis.norm_squared()).clamp(0.0, 1.0);
-        (p - a - axis * t).norm() - (w[0].3 + (w[1].3 - w[0].3) * t)
-    };
-    points.windows(2).map(cone).fold(f64::INFINITY, |d, c| if d.is_finite() { smooth_min(d, c, k) } else { c })
-}
-
-/// Quilez' quadratic smooth minimum.
-fn smooth_min(a: f64, b: f64, k: f64) -> f64 {
-    let h = (k - (a - b).abs()).max(0.0) / k;
-    a.min(b) - h * h * k * 0.25
 }
 
 fn part_at(p: P) -> u8 {

@@ -47,7 +47,7 @@ pub(crate) fn build() -> MeshBuilder {
     cella(&mut b, &floor, &ceiling);
     let eaves = entablature(&mut b, beam);
     roof(&mut b, &eaves);
-    b
+    b.without_strays()
 }
 
 fn steps(b: &mut MeshBuilder) -> Vec<u32> {
@@ -217,15 +217,15 @@ pub(crate) fn albedo(p: Vec3, normal: Vec3, part: u8) -> Vec3 {
         _ => blocks(p, normal, [0.026, 0.005]),
     };
     // Soot and rain: darker patches low down and in streaks.
-    let grime = fractal(p.component_mul(&Vec3::new(140.0, 140.0, 45.0)), 4, 71);
+    let grime = fractal(p.component_mul(&Vec3::new(140.0, 140.0, 45.0)), 3, 71);
     base * (1.0 - 0.28 * step(0.60, 0.30, grime))
 }
 
 /// Cream limestone: slow hue changes, veins, fine grain and pits.
 fn stone(p: Vec3) -> Vec3 {
-    let slow = fractal(p * 55.0, 4, 1);
+    let slow = fractal(p * 55.0, 3, 1);
     let grain = noise(p * 700.0, 7) * 0.6 + noise(p * 1400.0, 8) * 0.4;
-    let vein = 1.0 - (2.0 * fractal(p * 90.0, 5, 17) - 1.0).abs();
+    let vein = 1.0 - (2.0 * fractal(p * 90.0, 3, 17) - 1.0).abs();
     let tone = blend(color([206, 186, 150]), color([240, 230, 208]), slow);
     let tone = blend(tone, color([176, 148, 108]), 0.5 * step(0.94, 0.08, vein));
     let pits = step(0.82, 0.08, noise(p * 420.0, 23));

@@ -1,15 +1,21 @@
 //! `turnlight synth`
 
 use crate::Answer;
-use crate::arguments::SynthArgs;
+use crate::arguments::{FaultArgs, FilmingArgs, LayoutArg, LightArg, SynthArgs};
 use serde_json::json;
 use std::path::Path;
 use turnlight::Error;
-use turnlight::data_synth::{Layout, Scene, SynthCapture, SynthError, SynthOptions, synthesize_with};
+use turnlight::data_synth::{
+    Effort, Faults, Layout, LightFrame, Scene, SensorNoise, SynthCapture, SynthError, SynthOptions, synthesize_with,
+};
 use turnlight::stages::{Observer, Stages};
 
 /// Views, where none are asked for.
 const VIEWS: usize = 48;
+/// Paths per pixel, where none are asked for.
+const SAMPLES: u32 = 8;
+/// Turns of a spiral, where none are asked for.
+const TURNS: f64 = 5.0;
 
 pub(crate) fn run(args: &SynthArgs, observer: &dyn Observer) -> Result<Answer, Error> {
     if let Some(video) = &args.footage.video {
@@ -19,33 +25,81 @@ pub(crate) fn run(args: &SynthArgs, observer: &dyn Observer) -> Result<Answer, E
     let [width, height] = args.size;
     refuse_occupied(&args.output)?;
     let views = args.views.unwrap_or(VIEWS);
-    let options =
-        SynthOptions { views, width, height, seed: args.seed, layout: layout(views), ..SynthOptions::default() };
+    let filming = &args.filming;
+    let options = SynthOptions {
+        views,
+        width,
+        height,
+        seed: args.seed,
+        effort: filming.noise.map_or(Effort::Samples(filming.samples.unwrap_or(SAMPLES)), Effort::Noise),
+        light: match filming.light {
+            LightArg::Room => LightFrame::Room,
+            LightArg::Object => LightFrame::Object,
+        },
+        layout: layout(filming, views)?,
+        faults: faults(&args.faults),
+        maps: filming.maps,
+        ..SynthOptions::default()
+    };
     let mut stages = Stages::new(observer);
     let filmed = film(scene, &options, &mut stages)?;
     stages.run("write", |_| filmed.write(&args.output))?;
-    let text = format!("{}: {views} views of {width} × {height}\nwrote {}", scene.name(), args.output.display());
+    let mut text = format!("{}: {views} views of {width} × {height}", scene.name());
+    if let Some(noise) = filmed.report.noise_rms {
+        text.push_str(&format!(", noise {noise:.1}/255"));
+    }
+    text.push_str(&format!("\nwrote {}", args.output.display()));
     let json = json!({
         "scene": scene.name(),
         "views": views,
         "width": width,
         "height": height,
         "seed": args.seed,
-        "noise_rms": filmed.report.noise_rms,
+        "noise_rms_levels": filmed.report.noise_rms,
+        "rays": filmed.report.rays,
         "capture": args.output,
         "stages": stages.finished(),
     });
     Ok(Answer { text, json })
 }
 
-/// The usual rings, or as many of them as there are views for.
-fn layout(views: usize) -> Layout {
-    match SynthOptions::default().layout {
-        Layout::Rings { mut elevations_deg } => {
-            elevations_deg.truncate(views);
-            Layout::Rings { elevations_deg }
+/// Where the cameras stand; without elevations given, the usual ones, or as many as there are views for.
+fn layout(filming: &FilmingArgs, views: usize) -> Result<Layout, Error> {
+    let (given, turns) = (filming.elevations.as_deref(), filming.turns.unwrap_or(TURNS));
+    match (filming.layout, given) {
+        (LayoutArg::Rings, Some(rings)) => Ok(Layout::Rings { elevations_deg: rings.to_vec() }),
+        (LayoutArg::Rings, None) => {
+            let usual = [12.0, 35.0];
+            Ok(Layout::Rings { elevations_deg: usual[..views.clamp(1, usual.len())].to_vec() })
         }
-        other => other,
+        (LayoutArg::Spiral, None) => Ok(Layout::Spiral { from_deg: 0.0, to_deg: 60.0, turns }),
+        (LayoutArg::Spiral, Some(&[from_deg, to_deg])) => Ok(Layout::Spiral { from_deg, to_deg, turns }),
+        (LayoutArg::Spiral, Some(_)) => {
+            Err(Error::Arguments("--elevations: a spiral has two, of its first and its last view".to_owned()))
+        }
+        (LayoutArg::Hemisphere, None) => Ok(Layout::Hemisphere { above_deg: 5.0 }),
+        (LayoutArg::Hemisphere, Some(&[above_deg])) => Ok(Layout::Hemisphere { above_deg }),
+        (LayoutArg::Hemisphere, Some(_)) => {
+            Err(Error::Arguments("--elevations: random cameras have one, the lowest".to_owned()))
+        }
+    }
+}
+
+/// A sensor that is white at this many electrons.
+pub(super) fn sensor(full_well: f64) -> SensorNoise {
+    SensorNoise { full_well, read_electrons: 10.0 }
+}
+
+fn faults(args: &FaultArgs) -> Faults {
+    Faults {
+        sensor_noise: args.sensor_noise.map(sensor),
+        exposure_drift_stops: args.exposure_drift.unwrap_or(0.0),
+        camera_jitter_deg: args.jitter,
+        calibration_error_px: args.calibration_error,
+        matte_grow_px: args.mask_grow,
+        matte_holes: args.mask_holes,
+        motion_blur_deg: args.motion_blur,
+        distortion_k1: args.distortion.unwrap_or(0.0),
     }
 }
 

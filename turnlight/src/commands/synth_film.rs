@@ -1,24 +1,23 @@
 //! `turnlight synth --video`: a film as someone with a phone takes it, and its truth.
 
-use super::synth::refuse_occupied;
+use super::synth::{refuse_occupied, sensor};
 use crate::Answer;
 use crate::arguments::SynthArgs;
 use serde_json::json;
 use std::path::Path;
-use turnlight::capture::{Image, read_rgb};
-use turnlight::data_synth::Scene;
+use turnlight::Error;
+use turnlight::capture::{Distortion, Image, read_rgb};
 use turnlight::data_synth::footage::{Footage, FootageOptions, TruthFolder, set_up};
+use turnlight::data_synth::{Scene, SynthError};
 use turnlight::film;
 use turnlight::stages::{Observer, Stages};
-use turnlight::{Error, data_synth::SynthError};
 
 pub(crate) fn run(args: &SynthArgs, video: &Path, observer: &dyn Observer) -> Result<Answer, Error> {
     film::check(video)?;
     refuse_occupied(&args.output)?;
     refuse_odd(video, args.size)?;
-    let wrong = |fault: SynthError| Error::Arguments(fault.to_string());
     let scene: Scene = args.scene.parse().map_err(wrong)?;
-    let options = options(args).map_err(wrong)?;
+    let options = options(args)?;
     let mut stages = Stages::new(observer);
     let footage = stages.run("set up", |_| set_up(scene, &options)).map_err(wrong)?;
     stages.run("film", |observer| shoot(&footage, &args.output, observer))?;
@@ -50,19 +49,34 @@ pub(crate) fn run(args: &SynthArgs, video: &Path, observer: &dyn Observer) -> Re
     Ok(Answer { text, json })
 }
 
-fn options(args: &SynthArgs) -> Result<FootageOptions, SynthError> {
+fn options(args: &SynthArgs) -> Result<FootageOptions, Error> {
     let [width, height] = args.size;
-    let default = FootageOptions::default();
+    let (usual, filming, faults) = (FootageOptions::default(), &args.filming, &args.faults);
+    let elevation_deg = match filming.elevations.as_deref() {
+        None => usual.elevation_deg,
+        Some(&[elevation]) => elevation,
+        Some(_) => return Err(Error::Arguments("--elevations: a film has one, of its camera".to_owned())),
+    };
     Ok(FootageOptions {
-        frames: args.views.unwrap_or(default.frames),
+        frames: args.views.unwrap_or(usual.frames),
         width,
         height,
-        seed: args.seed,
-        backdrop: args.footage.backdrop.parse()?,
-        turns: args.footage.turns,
         fps: args.footage.fps,
-        ..default
+        seed: args.seed,
+        samples: filming.samples.unwrap_or(usual.samples),
+        turns: filming.turns.unwrap_or(usual.turns),
+        elevation_deg,
+        backdrop: args.footage.backdrop.parse().map_err(wrong)?,
+        distortion: faults.distortion.map_or(usual.distortion, |k1| Distortion { k1, ..Distortion::default() }),
+        sensor_noise: faults.sensor_noise.map(sensor).or(usual.sensor_noise),
+        exposure_drift_stops: faults.exposure_drift.unwrap_or(usual.exposure_drift_stops),
+        motion_blur_deg: faults.motion_blur,
+        ..usual
     })
+}
+
+fn wrong(fault: SynthError) -> Error {
+    Error::Arguments(fault.to_string())
 }
 
 /// Codecs store colour for blocks of 2 × 2; before minutes are spent on frames that none takes.
