@@ -24,7 +24,7 @@ fn errors(footage: &Footage, image: &Image<[u8; 3]>, frame: usize) -> Vec<f64> {
 fn the_board_is_found_where_the_truth_says_and_a_codec_leaves_it_there() {
     const SIZE: [usize; 2] = [640, 480];
     let [width, height] = SIZE;
-    let options = FootageOptions { frames: 2, width, height, samples: 8, seed: 3, ..FootageOptions::default() };
+    let options = FootageOptions { frames: 2, width, height, seed: 3, ..FootageOptions::default() };
     let footage = set_up(Scene::Temple, &options).expect("a film");
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("film.mp4");

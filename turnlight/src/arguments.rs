@@ -362,7 +362,7 @@ pub(crate) struct FilmingArgs {
     /// Full turns of the spiral, or of the film [default: 5, 1.05 of a film]
     #[arg(long, value_name = "N", value_parser = turns)]
     pub(crate) turns: Option<f64>,
-    /// Paths of light per pixel [default: 8, 16 of a film]
+    /// Paths of light per pixel [default: 8]
     #[arg(long, value_name = "N", value_parser = samples)]
     pub(crate) samples: Option<u32>,
     /// Trace as many paths as it takes for this noise over the object, in levels of 255 (instead of --samples)

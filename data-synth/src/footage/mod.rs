@@ -56,7 +56,7 @@ pub struct FootageOptions {
     pub fps: f64,
     /// Of everything random; the same seed gives the same bytes.
     pub seed: u64,
-    /// Paths per pixel of the object, 1 to 4096; the set gets an eighth.
+    /// Paths per pixel of the object, 1 to 4096; the set gets a quarter.
     pub samples: u32,
     /// Surfaces a path of light may touch, 1 to 1000.
     pub surfaces: usize,
@@ -116,7 +116,7 @@ impl Default for FootageOptions {
             height: 720,
             fps: 30.0,
             seed: 0,
-            samples: 16,
+            samples: 8,
             surfaces: 4,
             turns: 1.05,
             unsteadiness: 0.05,

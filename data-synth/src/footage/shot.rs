@@ -17,7 +17,7 @@ use rayon::prelude::*;
 /// Moments of an open shutter at which the room is turned.
 const MOMENTS: u32 = 4;
 /// Paths of a pixel of the object, or of an outline, in those of the set.
-const OVER_SET: u32 = 8;
+const OVER_SET: u32 = 4;
 /// Points at which the albedo of a pixel of the set is asked for; of one of several tones.
 const TONES: [u32; 2] = [4, 64];
 /// How far light is shared, in widths of the frame.
