@@ -465,3 +465,44 @@ fn films_are_written_where_the_build_can() {
     assert_eq!(run.code, Some(2));
     assert!(run.stderr.contains("green, blue, grey, black"), "{}", run.stderr);
 }
+
+#[test]
+fn synth_films_as_asked_and_keeps_the_truth_beside() {
+    let place = tempfile::tempdir().expect("a folder");
+    let small = ["--views", "3", "--size", "32x24", "--seed", "4"];
+    let run = |name: &str, more: &[&str]| {
+        let args = [&["synth", "mug", "-o", name, "--json", "--quiet"], small.as_slice(), more].concat();
+        let run = turnlight(place.path(), &args);
+        assert_eq!(run.code, Some(0), "{}", run.stderr);
+        serde_json::from_str::<Value>(&run.stdout).expect("JSON")
+    };
+    let read = |path: &str| -> Value {
+        serde_json::from_str(&fs::read_to_string(place.path().join(path)).expect("a file")).expect("JSON")
+    };
+    let filmed = run("plain", &["--noise", "12", "--maps", "--light", "object", "--layout", "spiral"]);
+    assert!(filmed["noise_rms_levels"].as_f64().expect("noise") < 16.0, "{filmed}");
+    assert!(place.path().join("plain/truth/0002.exr").exists());
+    let (capture, truth) = (read("plain/transforms.json"), read("plain/truth.json"));
+    for k in 0..3 {
+        assert_eq!(capture["frames"][k]["transform_matrix"], truth["frames"][k]["transform_matrix"]);
+        assert_eq!(capture["frames"][k]["light_direction"], capture["frames"][0]["light_direction"]);
+    }
+    let faults = ["--calibration-error", "1", "--exposure-drift", "0.2", "--sensor-noise", "3000", "--jitter", "1"];
+    run("faulty", &[faults.as_slice(), &["--mask-grow", "-1", "--mask-holes", "2", "--motion-blur", "2"]].concat());
+    let (capture, truth) = (read("faulty/transforms.json"), read("faulty/truth.json"));
+    assert_ne!(capture["frames"][1]["transform_matrix"], truth["frames"][1]["transform_matrix"]);
+    assert_ne!(truth["frames"][0]["exposure"], truth["frames"][1]["exposure"]);
+    assert!(!place.path().join("faulty/truth").exists());
+}
+
+#[test]
+fn synth_names_the_option_that_is_out_of_range() {
+    let place = tempfile::tempdir().expect("a folder");
+    let with = |more: &[&'static str]| [&["synth", "mug", "-o", "s", "--views", "2"], more].concat();
+    assert_fails(place.path(), &with(&["--jitter", "NaN"]), &["camera_jitter_deg"]);
+    assert_fails(place.path(), &with(&["--elevations", "95"]), &["elevation"]);
+    for wrong in [&["--noise", "0"][..], &["--noise", "2", "--samples", "8"], &["--light", "moon"]] {
+        let run = turnlight(place.path(), &with(wrong));
+        assert_eq!(run.code, Some(2), "{wrong:?}: {}", run.stderr);
+    }
+}
