@@ -271,7 +271,7 @@ mod tests {
         use exr::prelude::{ReadChannels, ReadLayers, read};
         let capture = small();
         let options = SynthOptions {
-            views: 1,
+            views: 2,
             width: 32,
             height: 24,
             effort: Effort::Samples(4),
