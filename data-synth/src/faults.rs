@@ -111,12 +111,7 @@ impl Faults {
 
     /// The picture as the sensor gives it, 8-bit sRGB.
     pub(crate) fn develop(&self, picture: &Picture, seed: u64, view: usize) -> Image<[u8; 3]> {
-        let gain = self.exposure(seed, view) as f32;
-        let mut linear = picture.radiance.map(|p| p.map(|c| (c * gain).min(1.0)));
-        if let Some(sensor) = self.sensor_noise {
-            sensor.apply(&mut linear, seed, view);
-        }
-        linear.map(|p| p.map(|c| encode(c).round() as u8))
+        develop(&picture.radiance, self.exposure(seed, view), self.sensor_noise, seed, view)
     }
 
     /// The matte as someone cut it.
@@ -137,6 +132,21 @@ impl Faults {
         }
         matte
     }
+}
+
+/// Linear radiance, white at 1, times `gain` as a sensor gives it: 8-bit sRGB.
+pub(crate) fn develop(
+    radiance: &Image<[f32; 3]>,
+    gain: f64,
+    noise: Option<SensorNoise>,
+    seed: u64,
+    view: usize,
+) -> Image<[u8; 3]> {
+    let mut linear = radiance.map(|p| p.map(|c| (c * gain as f32).min(1.0)));
+    if let Some(sensor) = noise {
+        sensor.apply(&mut linear, seed, view);
+    }
+    linear.map(|p| p.map(|c| encode(c).round() as u8))
 }
 
 impl SensorNoise {
@@ -183,7 +193,7 @@ fn uniform(state: u64) -> f64 {
 }
 
 /// Two standard normal numbers (Box and Muller 1958).
-fn normal(state: u64) -> [f64; 2] {
+pub(crate) fn normal(state: u64) -> [f64; 2] {
     let u = ((state >> 32) as f64 + 0.5) / 4_294_967_296.0;
     let v = (state & 0xffff_ffff) as f64 / 4_294_967_296.0;
     let (r, (s, c)) = ((-2.0 * u.ln()).sqrt(), (TAU * v).sin_cos());

@@ -77,7 +77,7 @@ pub(crate) struct Picture {
 
 /// What is known of a pixel before radiance is.
 #[derive(Clone, Copy, Debug, Default)]
-struct Cover {
+pub(crate) struct Cover {
     /// Which points of the grid of [`COVERAGE_SIDE`] meet the object, where it was tried.
     points: u64,
     is_tried: bool,
@@ -97,7 +97,7 @@ struct Shade {
 /// Takes one picture. Rows are shared among threads; every pixel depends on its own seed alone, and on
 /// the noise of the whole picture where samples are shared out.
 pub(crate) fn expose(camera: &Camera, exposure: &Exposure<'_>) -> Picture {
-    let shot = Shot { exposure, lens: Lens::new(camera, exposure.shutter_rad) };
+    let shot = Shot::new(camera, exposure);
     let (covers, probes) = shot.covers();
     let (samples, piloted) = match exposure.effort {
         Effort::Samples(n) => (covers.map(|c| if c.share() > 0.0 { n } else { 0 }), 0),
@@ -108,7 +108,8 @@ pub(crate) fn expose(camera: &Camera, exposure: &Exposure<'_>) -> Picture {
 }
 
 impl Cover {
-    fn share(&self) -> f32 {
+    /// Share of the pixel the object covers.
+    pub(crate) fn share(&self) -> f32 {
         if self.is_full { 1.0 } else { self.points.count_ones() as f32 / (COVERAGE_SIDE * COVERAGE_SIDE) as f32 }
     }
 }
@@ -123,9 +124,9 @@ struct Lens {
 
 /// A ray through a pixel.
 #[derive(Clone, Copy)]
-struct Sight {
-    origin: Vec3,
-    direction: Vec3,
+pub(crate) struct Sight {
+    pub(crate) origin: Vec3,
+    pub(crate) direction: Vec3,
 }
 
 impl Lens {
@@ -168,23 +169,42 @@ impl Lens {
 }
 
 /// A camera with what it takes a picture of.
-struct Shot<'a> {
+pub(crate) struct Shot<'a> {
     exposure: &'a Exposure<'a>,
     lens: Lens,
 }
 
-impl Shot<'_> {
-    fn size(&self) -> [usize; 2] {
+impl<'a> Shot<'a> {
+    pub(crate) fn new(camera: &Camera, exposure: &'a Exposure<'a>) -> Self {
+        Self { exposure, lens: Lens::new(camera, exposure.shutter_rad) }
+    }
+
+    pub(crate) fn exposure(&self) -> &'a Exposure<'a> {
+        self.exposure
+    }
+
+    pub(crate) fn world(&self) -> &'a World {
+        self.exposure.world
+    }
+
+    /// The ray through a point of the picture at a `moment` in [0, 1) of the exposure.
+    pub(crate) fn sight(&self, pixel: Point2<f64>, moment: f32) -> Sight {
+        self.lens.sight(pixel, moment)
+    }
+
+    /// Width and height.
+    pub(crate) fn size(&self) -> [usize; 2] {
         [self.lens.camera.intrinsics.width, self.lens.camera.intrinsics.height]
     }
 
     fn meets(&self, x: f64, y: f64, moment: f32) -> bool {
         let sight = self.lens.sight(Point2::new(x, y), moment);
-        self.exposure.world.first_hit(sight.origin, sight.direction).is_some()
+        let world = self.exposure.world;
+        world.first_hit(sight.origin, sight.direction).is_some_and(|hit| world.is_object(&hit))
     }
 
-    /// Coverage, depth and normal of every pixel, and the rays it took.
-    fn covers(&self) -> (Image<Cover>, u64) {
+    /// Coverage, depth and normal of the object in every pixel, and the rays it took.
+    pub(crate) fn covers(&self) -> (Image<Cover>, u64) {
         let [width, height] = self.size();
         let corner_row = |y: usize| -> Vec<bool> { (0..=width).map(|x| self.meets(x as f64, y as f64, 0.5)).collect() };
         let corners: Vec<Vec<bool>> = (0..=height).into_par_iter().map(corner_row).collect();
@@ -213,7 +233,8 @@ impl Shot<'_> {
         let nothing = Cover { depth: f32::INFINITY, ..Cover::default() };
         let sight = self.lens.sight(Point2::new(x as f64 + 0.5, y as f64 + 0.5), 0.5);
         let world = self.exposure.world;
-        world.first_hit(sight.origin, sight.direction).map_or(nothing, |hit| {
+        let hit = world.first_hit(sight.origin, sight.direction).filter(|hit| world.is_object(hit));
+        hit.map_or(nothing, |hit| {
             let along = f64::from(hit.distance) * sight.direction.cast::<f64>().dot(&self.lens.camera.forward());
             let normal = world.shading_normal(hit, sight.direction);
             Cover { is_full: true, depth: along as f32, normal, ..nothing }
@@ -325,7 +346,7 @@ impl Shot<'_> {
     }
 
     /// Calls `at` for every pixel, rows shared among threads.
-    fn by_pixel<T: Default + Copy + Send>(&self, at: impl Fn(usize, usize) -> T + Sync) -> Image<T> {
+    pub(crate) fn by_pixel<T: Default + Copy + Send>(&self, at: impl Fn(usize, usize) -> T + Sync) -> Image<T> {
         let [width, height] = self.size();
         let mut image = Image::filled(width, height, T::default());
         image.pixels_mut().par_chunks_mut(width.max(1)).enumerate().for_each(|(y, row)| {

@@ -6,6 +6,8 @@
 //!
 //! [`btf`] measures materials under 81 × 81 directions of view and light.
 //!
+//! [`footage`] films the same scenes as someone with a phone would: board, backdrop, lens, unsteady platter.
+//!
 //! [`hull_truth`] knows the visual hulls of simple solids without carving them.
 //!
 //! This crate shares no shading code with `render` and knows no appearance: truth must not lean on
@@ -19,6 +21,7 @@ pub mod btf;
 mod error;
 mod faults;
 mod film;
+pub mod footage;
 pub mod hull_truth;
 mod isosurface;
 mod light;

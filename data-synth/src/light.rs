@@ -211,6 +211,30 @@ impl LightRig {
         }
     }
 
+    /// Soft boxes above a table: a warm key at the upper left, a cooler fill on the right, a light from above
+    /// and behind, a pale ceiling. Sized by the `length` of the set, so that white paper comes out light, not white.
+    pub(crate) fn film_set(length: f32) -> Self {
+        let target = Vec3::zeros();
+        let light = |azimuth_deg: f32, elevation_deg: f32, half: [f32; 2], radiance: [f32; 3]| {
+            let (sa, ca) = azimuth_deg.to_radians().sin_cos();
+            let (se, ce) = elevation_deg.to_radians().sin_cos();
+            let center = target + Vec3::new(ce * ca, ce * sa, se) * (5.0 * length);
+            AreaLight::facing(LightShape::Rectangle, center, target, half.map(|h| h * length), Vec3::from(radiance))
+        };
+        Self {
+            sky: Sky {
+                ground: Vec3::new(0.10, 0.10, 0.10),
+                horizon: Vec3::new(0.22, 0.22, 0.23),
+                zenith: Vec3::new(0.30, 0.31, 0.33),
+            },
+            lights: vec![
+                light(-52.0, 48.0, [1.1, 1.1], [8.6, 8.0, 7.2]),
+                light(62.0, 38.0, [0.8, 1.4], [2.7, 3.0, 3.5]),
+                light(160.0, 58.0, [1.0, 1.0], [3.4, 3.4, 3.4]),
+            ],
+        }
+    }
+
     /// The rig turned about z by `yaw` radians.
     pub(crate) fn turned(&self, yaw: f32) -> Self {
         Self { sky: self.sky, lights: self.lights.iter().map(|l| l.turned(yaw)).collect() }

@@ -7,12 +7,15 @@
 //! mean is unbiased; [`PathLimits`] bounds them only where asked to.
 
 use crate::accel::{Accel, Hit};
+use crate::footage::{SET, Set};
 use crate::light::{LightRig, LightSample};
 use crate::material::{Coat, Finish, Lobes, Surface, Vec3, frame_around, fresnel_dielectric, reflect};
 use crate::medium::{Medium, Profile};
 use crate::sampler::Sampler;
 use crate::scene::Paint;
+use crate::shape::{MeshBuilder, corner_normals};
 use geometry::Mesh;
+use std::sync::Arc;
 
 /// Passages of glass a path may make: beyond, what is left is less than roulette would keep.
 const MAX_PASSAGES: usize = 64;
@@ -20,17 +23,23 @@ const MAX_PASSAGES: usize = 64;
 const MAX_CROSSINGS: usize = 16;
 /// Odds of probing along the tangents and the normal: on a flat part only the normal finds anything.
 const AXIS_ODDS: [f32; 3] = [0.1, 0.1, 0.8];
+/// Faces of a set that meet under more than this are shaded apart.
+const SET_CREASE_RAD: f64 = 0.6;
 /// Most a path is likely to survive a surface by roulette.
 const SURVIVAL: f32 = 0.95;
 
-/// A scene made ready for tracing.
-#[derive(Debug)]
+/// A scene made ready for tracing; clones share it.
+#[derive(Clone, Debug)]
 pub(crate) struct World {
-    accel: Accel,
-    faces: Vec<Face>,
+    accel: Arc<Accel>,
+    faces: Arc<Vec<Face>>,
     paint: Paint,
     /// By part; parts beyond the last are made of the last.
-    finishes: Vec<Finish>,
+    finishes: Arc<Vec<Finish>>,
+    /// What the object stands on and before, where there is anything.
+    set: Option<Arc<Set>>,
+    /// Turn of the room about z against the object, in radians.
+    yaw: f32,
     /// How far a scattered ray starts off the surface: beyond the rounding of a hit point.
     offset: f32,
 }
@@ -108,7 +117,42 @@ impl World {
             part: parts.get(f).copied().unwrap_or(0),
         };
         let faces = (0..mesh.faces.len()).map(face).collect();
-        Self { accel: Accel::new(mesh), faces, paint, finishes, offset: 1e-5 * diagonal }
+        let (accel, faces, finishes) = (Arc::new(Accel::new(mesh)), Arc::new(faces), Arc::new(finishes));
+        Self { accel, faces, paint, finishes, set: None, yaw: 0.0, offset: 1e-5 * diagonal }
+    }
+
+    /// Puts the `object` the world was made from on a set, all of it matt.
+    pub(crate) fn on_set(self, object: &Mesh, set: Set) -> Self {
+        let MeshBuilder { mesh, parts, .. } = set.build();
+        let normals = corner_normals(&mesh, SET_CREASE_RAD);
+        let furniture = Self::new(&mesh, &normals, &parts, self.paint, Vec::new());
+        let mut all = object.clone();
+        let first = all.positions.len() as u32;
+        all.positions.extend(mesh.positions);
+        all.faces.extend(mesh.faces.iter().map(|face| face.map(|v| v + first)));
+        let faces = self.faces.iter().chain(furniture.faces.iter()).copied().collect();
+        Self { accel: Arc::new(Accel::new(&all)), faces: Arc::new(faces), set: Some(Arc::new(set)), ..self }
+    }
+
+    /// The same with the room turned about z by `yaw` radians; the object, and what turns with it, stay.
+    pub(crate) fn turned(&self, yaw: f32) -> Self {
+        Self { yaw, ..self.clone() }
+    }
+
+    /// Whether a hit is on the object, not on the set.
+    pub(crate) fn is_object(&self, hit: &Hit) -> bool {
+        self.part(hit) < SET
+    }
+
+    /// Which part a hit is on.
+    pub(crate) fn part(&self, hit: &Hit) -> u8 {
+        self.faces[hit.face as usize].part
+    }
+
+    /// Whether a hit is on what is printed dark on the board of the set.
+    pub(crate) fn is_dark(&self, hit: &Hit) -> bool {
+        let face = &self.faces[hit.face as usize];
+        self.set.as_ref().is_some_and(|set| set.is_dark(face.position(hit.barycentric), face.part))
     }
 
     /// What a camera ray meets.
@@ -146,6 +190,9 @@ impl World {
     }
 
     fn finish(&self, face: &Face) -> &Finish {
+        if face.part >= SET {
+            return &Finish::Matt;
+        }
         self.finishes.get(usize::from(face.part)).or(self.finishes.last()).unwrap_or(&Finish::Matt)
     }
 
@@ -183,10 +230,15 @@ impl World {
         direction.dot(&self.faces[hit.face as usize].normal) >= 0.0
     }
 
-    fn albedo(&self, hit: Hit, direction: Vec3) -> Vec3 {
+    /// The paint at a hit.
+    pub(crate) fn albedo(&self, hit: Hit, direction: Vec3) -> Vec3 {
         let face = &self.faces[hit.face as usize];
+        let position = face.position(hit.barycentric);
+        if let Some(set) = self.set.as_ref().filter(|_| face.part >= SET) {
+            return set.albedo(position, face.part, self.yaw);
+        }
         let normal = face.shading_normal(hit.barycentric, direction, face.normal);
-        self.paint.albedo(face.position(hit.barycentric), normal, face.part)
+        self.paint.albedo(position, normal, face.part)
     }
 }
 
@@ -438,7 +490,7 @@ mod tests {
     use super::*;
     use crate::light::{AreaLight, LightShape, Sky};
     use crate::sampler::{mix, pixel_seed};
-    use crate::shape::{MeshBuilder, corner_normals, sphere};
+    use crate::shape::sphere;
     use std::f64::consts::PI;
 
     const LIMITS: PathLimits = PathLimits { surfaces: 100 };

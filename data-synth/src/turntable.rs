@@ -140,7 +140,8 @@ fn extent(cameras: &[Camera], mesh: &Mesh) -> [f64; 2] {
     extent
 }
 
-fn look_at(target: &Point3<f64>, station: &Station, distance: f64, intrinsics: Intrinsics) -> Camera {
+/// The camera of a station at a distance from what it looks at, upright.
+pub(crate) fn look_at(target: &Point3<f64>, station: &Station, distance: f64, intrinsics: Intrinsics) -> Camera {
     let (sa, ca) = station.azimuth.sin_cos();
     let (se, ce) = station.elevation.sin_cos();
     let outward = Vector3::new(ce * ca, ce * sa, se);

@@ -9,14 +9,15 @@
 
 use crate::error::SynthError;
 use crate::synth::{SynthCapture, TruthMaps};
-use capture::{Camera, Image};
+use capture::{Aabb, Camera, Image, View};
 use exr::prelude::{AnyChannel, AnyChannels, FlatSamples, Vec2, WritableImage};
 use geometry::Mesh;
 use image::{ExtendedColorType, ImageFormat};
 use nalgebra::{Matrix4, Vector3};
 use serde_json::{Value, json};
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use tempfile::TempDir;
 
 impl SynthCapture {
     /// Writes the capture folder `dir`, which must not exist yet or be empty.
@@ -25,7 +26,31 @@ impl SynthCapture {
     /// [`SynthError::Exists`] where the folder holds something, otherwise names the file that could
     /// not be written.
     pub fn write(&self, dir: impl AsRef<Path>) -> Result<(), SynthError> {
-        let dir = dir.as_ref();
+        let mut folder = CaptureFolder::create(dir.as_ref())?;
+        for (view, light) in self.views.iter().zip(&self.light_directions) {
+            folder.add(view, light)?;
+        }
+        for (view, truth) in self.views.iter().zip(&self.truths) {
+            truth.maps.as_ref().map(|maps| folder.add_maps(&view.name, maps)).transpose()?;
+        }
+        folder.finish(&self.mesh, &self.aabb, &self.truth())
+    }
+}
+
+/// A capture folder under construction, a view at a time. Dropped without [`CaptureFolder::finish`], it leaves
+/// nothing.
+#[derive(Debug)]
+pub(crate) struct CaptureFolder {
+    dir: PathBuf,
+    staging: TempDir,
+    /// The keys of the lens, from the first view.
+    lens: Value,
+    frames: Vec<Value>,
+}
+
+impl CaptureFolder {
+    /// Starts a folder that will appear at `dir`, which must not exist yet or be empty.
+    pub(crate) fn create(dir: &Path) -> Result<Self, SynthError> {
         if is_occupied(dir) {
             return Err(SynthError::Exists { path: dir.to_owned() });
         }
@@ -34,64 +59,62 @@ impl SynthCapture {
         // Beside the target, so that the rename stays on one file system; gone if we fail.
         let staging =
             tempfile::Builder::new().prefix(".turnlight-synth-").tempdir_in(parent).map_err(io_error(parent))?;
-        let inner = staging.path().join("capture");
-        self.write_all(&inner)?;
+        for sub in ["images", "masks"] {
+            let path = staging.path().join("capture").join(sub);
+            fs::create_dir_all(&path).map_err(io_error(&path))?;
+        }
+        Ok(Self { dir: dir.to_owned(), staging, lens: json!({}), frames: Vec::new() })
+    }
+
+    /// Writes picture and matte of a view lit from the unit direction `light`.
+    pub(crate) fn add(&mut self, view: &View, light: &Vector3<f64>) -> Result<(), SynthError> {
+        let inner = self.inner();
+        write_rgb(&inner.join(image_path(&view.name)), &view.image)?;
+        write_grey(&inner.join(mask_path(&view.name)), &view.matte)?;
+        if self.frames.is_empty() {
+            self.lens = intrinsics(&view.camera);
+        }
+        self.frames.push(json!({
+            "file_path": image_path(&view.name),
+            "mask_path": mask_path(&view.name),
+            "transform_matrix": rows(&opengl_world_from_camera(&view.camera)),
+            "light_direction": [light.x, light.y, light.z],
+        }));
+        Ok(())
+    }
+
+    fn add_maps(&self, name: &str, maps: &TruthMaps) -> Result<(), SynthError> {
+        let folder = self.inner().join("truth");
+        fs::create_dir_all(&folder).map_err(io_error(&folder))?;
+        write_maps(&self.inner().join(truth_path(name)), maps)
+    }
+
+    /// Adds the true surface and what `truth.json` says, and makes the folder appear.
+    pub(crate) fn finish(self, mesh: &Mesh, aabb: &Aabb, truth: &Value) -> Result<(), SynthError> {
+        let (inner, dir) = (self.inner(), &self.dir);
+        write_bytes(&inner.join("truth.ply"), &ply(mesh))?;
+        let mut document = self.lens;
+        document["unit"] = json!(1.0);
+        document["aabb"] = json!([aabb.min.coords.as_slice(), aabb.max.coords.as_slice()]);
+        document["frames"] = Value::Array(self.frames);
+        write_json(&inner.join("transforms.json"), &document)?;
+        write_json(&inner.join("truth.json"), truth)?;
         if dir.is_dir() {
-            // Empty, as checked above; some systems do not rename over a folder.
+            // Empty, as checked at the start; some systems do not rename over a folder.
             fs::remove_dir(dir).map_err(io_error(dir))?;
         }
         fs::rename(&inner, dir).map_err(io_error(dir))
     }
 
-    fn write_all(&self, dir: &Path) -> Result<(), SynthError> {
-        for sub in ["images", "masks"] {
-            let path = dir.join(sub);
-            fs::create_dir_all(&path).map_err(io_error(&path))?;
-        }
-        for view in &self.views {
-            write_rgb(&dir.join(image_path(&view.name)), &view.image)?;
-            write_grey(&dir.join(mask_path(&view.name)), &view.matte)?;
-        }
-        write_bytes(&dir.join("truth.ply"), &ply(&self.mesh))?;
-        write_bytes(&dir.join("truth.json"), format!("{:#}\n", self.truth()).as_bytes())?;
-        let maps = self.views.iter().zip(&self.truths).filter_map(|(v, t)| Some((v, t.maps.as_ref()?)));
-        for (i, (view, maps)) in maps.enumerate() {
-            if i == 0 {
-                fs::create_dir(dir.join("truth")).map_err(io_error(dir))?;
-            }
-            write_maps(&dir.join(truth_path(&view.name)), maps)?;
-        }
-        let text = format!("{:#}\n", self.transforms());
-        write_bytes(&dir.join("transforms.json"), text.as_bytes())
-    }
-
-    fn transforms(&self) -> Value {
-        let frames: Vec<Value> = self
-            .views
-            .iter()
-            .zip(&self.light_directions)
-            .map(|(view, light)| {
-                json!({
-                    "file_path": image_path(&view.name),
-                    "mask_path": mask_path(&view.name),
-                    "transform_matrix": rows(&opengl_world_from_camera(&view.camera)),
-                    "light_direction": [light.x, light.y, light.z],
-                })
-            })
-            .collect();
-        let mut document = self.views.first().map_or_else(|| json!({}), |v| intrinsics(&v.camera));
-        let (low, high) = (self.aabb.min, self.aabb.max);
-        document["unit"] = json!(1.0);
-        document["aabb"] = json!([[low.x, low.y, low.z], [high.x, high.y, high.z]]);
-        document["frames"] = Value::Array(frames);
-        document
+    fn inner(&self) -> PathBuf {
+        self.staging.path().join("capture")
     }
 }
 
 impl SynthCapture {
     /// What faults hide: the cameras that took the views, and how bright each came out.
     fn truth(&self) -> Value {
-        let frame = |(view, truth): (&capture::View, &crate::synth::ViewTruth)| {
+        let frame = |(view, truth): (&View, &crate::synth::ViewTruth)| {
             json!({
                 "file_path": image_path(&view.name),
                 "transform_matrix": rows(&opengl_world_from_camera(&truth.camera)),
@@ -124,7 +147,7 @@ fn write_maps(path: &Path, maps: &TruthMaps) -> Result<(), SynthError> {
 }
 
 /// The shared lens; our pixel centres are at half integers, as nerfstudio's are.
-fn intrinsics(camera: &Camera) -> Value {
+pub(crate) fn intrinsics(camera: &Camera) -> Value {
     let i = camera.intrinsics;
     json!({
         "camera_model": "OPENCV",
@@ -135,7 +158,7 @@ fn intrinsics(camera: &Camera) -> Value {
 }
 
 /// Camera to world with OpenGL axes (y up, z back).
-fn opengl_world_from_camera(camera: &Camera) -> Matrix4<f64> {
+pub(crate) fn opengl_world_from_camera(camera: &Camera) -> Matrix4<f64> {
     let flip = nalgebra::Matrix3::from_diagonal(&Vector3::new(1.0, -1.0, -1.0));
     let mut m = Matrix4::identity();
     m.fixed_view_mut::<3, 3>(0, 0).copy_from(&(camera.rotation.transpose() * flip));
@@ -143,7 +166,7 @@ fn opengl_world_from_camera(camera: &Camera) -> Matrix4<f64> {
     m
 }
 
-fn rows(m: &Matrix4<f64>) -> Vec<Vec<f64>> {
+pub(crate) fn rows(m: &Matrix4<f64>) -> Vec<Vec<f64>> {
     m.row_iter().map(|row| row.iter().copied().collect()).collect()
 }
 
@@ -167,7 +190,7 @@ fn ply(mesh: &Mesh) -> Vec<u8> {
     bytes
 }
 
-fn image_path(name: &str) -> String {
+pub(crate) fn image_path(name: &str) -> String {
     format!("images/{name}.png")
 }
 
@@ -192,6 +215,10 @@ fn encode(path: &Path, bytes: &[u8], width: usize, height: usize, kind: Extended
     image::write_buffer_with_format(&mut out, bytes, width as u32, height as u32, kind, ImageFormat::Png)
         .map_err(|source| SynthError::Encode { path: path.to_owned(), source })?;
     write_bytes(path, out.get_ref())
+}
+
+fn write_json(path: &Path, document: &Value) -> Result<(), SynthError> {
+    write_bytes(path, format!("{document:#}\n").as_bytes())
 }
 
 fn write_bytes(path: &Path, bytes: &[u8]) -> Result<(), SynthError> {
@@ -244,7 +271,7 @@ mod tests {
         use exr::prelude::{ReadChannels, ReadLayers, read};
         let capture = small();
         let options = SynthOptions {
-            views: 1,
+            views: 2,
             width: 32,
             height: 24,
             effort: Effort::Samples(4),

@@ -440,7 +440,7 @@ fn boards_are_drawn_to_the_scale_they_say() {
 #[test]
 fn films_are_written_where_the_build_can() {
     let place = tempfile::tempdir().expect("a folder");
-    let args = ["synth", "elephant", "-o", "capture", "--views", "4", "--size", "64x48", "--quiet", "--video"];
+    let args = ["synth", "temple", "-o", "capture", "--views", "3", "--size", "32x24", "--quiet", "--video"];
     let run = turnlight(place.path(), &[&args[..], &["film.gif"]].concat());
     assert_eq!(run.code, Some(2), "{}", run.stderr);
     assert!(run.stderr.contains(".apng") && listing(place.path()).is_empty(), "{}", run.stderr);
@@ -448,11 +448,22 @@ fn films_are_written_where_the_build_can() {
     if cfg!(feature = "video") {
         assert_eq!((run.code, run.stderr.as_str()), (Some(0), ""));
         assert!(fs::read(place.path().join("film.mp4")).expect("a film")[4..].starts_with(b"ftyp"));
+        assert!(place.path().join("capture/truth.json").exists());
+        fs::remove_dir_all(place.path().join("capture")).expect("our own folder");
+        let odd = ["synth", "temple", "-o", "capture", "--size", "33x24", "--video", "odd.mp4"];
+        assert!(turnlight(place.path(), &odd).stderr.contains("32x24"));
     } else {
         assert_eq!(run.code, Some(2), "{}", run.stderr);
         assert!(run.stderr.contains("--features video"), "{}", run.stderr);
         assert!(listing(place.path()).is_empty());
     }
+    // An animated picture needs no codec, and shows the same.
+    let run = turnlight(place.path(), &[&args[..], &["film.png", "--backdrop", "blue"]].concat());
+    assert_eq!((run.code, run.stderr.as_str()), (Some(0), ""));
+    assert!(fs::read(place.path().join("film.png")).expect("a film").starts_with(b"\x89PNG"));
+    let run = turnlight(place.path(), &["synth", "temple", "-o", "s", "--video", "a.png", "--backdrop", "pink"]);
+    assert_eq!(run.code, Some(2));
+    assert!(run.stderr.contains("green, blue, grey, black"), "{}", run.stderr);
 }
 
 #[test]

@@ -314,22 +314,36 @@ pub(crate) struct SynthArgs {
     /// The capture to write
     #[arg(short, long, value_name = "DIR")]
     pub(crate) output: PathBuf,
-    /// Number of views
-    #[arg(long, value_name = "N", default_value = "48", value_parser = frames)]
-    pub(crate) views: usize,
+    /// Number of views [default: 48, 150 of a film]
+    #[arg(long, value_name = "N", value_parser = frames)]
+    pub(crate) views: Option<usize>,
     /// Size of the frames
     #[arg(long, value_name = "WxH", default_value = "640x480", value_parser = size)]
     pub(crate) size: [usize; 2],
     /// Seed of everything random
     #[arg(long, default_value = "1")]
     pub(crate) seed: u64,
-    /// Write the frames as a film too (.png .apng: animated; .mp4 .mov .avi .mkv where built with films)
-    #[arg(long, value_name = "FILE")]
-    pub(crate) video: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) footage: FootageArgs,
     #[command(flatten)]
     pub(crate) filming: FilmingArgs,
     #[command(flatten)]
     pub(crate) faults: FaultArgs,
+}
+
+/// What `synth` films as someone with a phone would.
+#[derive(Debug, Args)]
+pub(crate) struct FootageArgs {
+    /// Film it on a board before a cloth, as with a phone (.mp4 .mov .avi .mkv where built with films; .png .apng:
+    /// animated); the capture is then the film's truth
+    #[arg(long, value_name = "FILE")]
+    pub(crate) video: Option<PathBuf>,
+    /// Colour of the cloth: green, blue, grey, black
+    #[arg(long, value_name = "COLOUR", default_value = "green", requires = "video")]
+    pub(crate) backdrop: String,
+    /// Frames per second of the film
+    #[arg(long, value_name = "N", default_value = "30", requires = "video", value_parser = rate)]
+    pub(crate) fps: f64,
 }
 
 /// How a scene is filmed.
@@ -337,29 +351,29 @@ pub(crate) struct SynthArgs {
 #[command(next_help_heading = "Filming")]
 pub(crate) struct FilmingArgs {
     /// What the light is fixed to: the room, as on a turntable, or the object
-    #[arg(long, default_value = "room")]
+    #[arg(long, default_value = "room", conflicts_with = "video")]
     pub(crate) light: LightArg,
     /// Where the cameras stand: on rings, on a spiral that climbs, or at random above the table
-    #[arg(long, default_value = "rings")]
+    #[arg(long, default_value = "rings", conflicts_with = "video")]
     pub(crate) layout: LayoutArg,
-    /// Elevations in degrees: of the rings; of the spiral's ends; the lowest of random cameras
+    /// Elevations in degrees: of the rings; of a film; of the spiral's ends; the lowest of random cameras
     #[arg(long, value_name = "DEG,..", value_delimiter = ',', allow_negative_numbers = true)]
     pub(crate) elevations: Option<Vec<f64>>,
-    /// Full turns of the spiral
-    #[arg(long, value_name = "N", default_value = "5", value_parser = turns)]
-    pub(crate) turns: f64,
-    /// Paths of light per pixel
-    #[arg(long, value_name = "N", default_value = "32", value_parser = samples)]
-    pub(crate) samples: u32,
+    /// Full turns of the spiral, or of the film [default: 5, 1.05 of a film]
+    #[arg(long, value_name = "N", value_parser = turns)]
+    pub(crate) turns: Option<f64>,
+    /// Paths of light per pixel [default: 32, 8 of a film]
+    #[arg(long, value_name = "N", value_parser = samples)]
+    pub(crate) samples: Option<u32>,
     /// Trace as many paths as it takes for this noise over the object, in levels of 255 (instead of --samples)
-    #[arg(long, value_name = "LEVELS", value_parser = levels, conflicts_with = "samples")]
+    #[arg(long, value_name = "LEVELS", value_parser = levels, conflicts_with_all = ["samples", "video"])]
     pub(crate) noise: Option<f64>,
     /// Write radiance, depth, normals and noise of every view as truth/NNNN.exr
-    #[arg(long)]
+    #[arg(long, conflicts_with = "video")]
     pub(crate) maps: bool,
 }
 
-/// What goes wrong; nothing unless asked for.
+/// What goes wrong; nothing unless asked for, in a film what a phone does.
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Faults")]
 pub(crate) struct FaultArgs {
@@ -367,26 +381,26 @@ pub(crate) struct FaultArgs {
     #[arg(long, value_name = "ELECTRONS")]
     pub(crate) sensor_noise: Option<f64>,
     /// Exposure that drifts from view to view by so many stops (standard deviation)
-    #[arg(long, value_name = "STOPS", default_value = "0")]
-    pub(crate) exposure_drift: f64,
+    #[arg(long, value_name = "STOPS")]
+    pub(crate) exposure_drift: Option<f64>,
     /// Cameras that stand and point off by so many degrees (standard deviation), and are known
-    #[arg(long, value_name = "DEG", default_value = "0")]
+    #[arg(long, value_name = "DEG", default_value = "0", conflicts_with = "video")]
     pub(crate) jitter: f64,
     /// Cameras written with an error of so many pixels (standard deviation)
-    #[arg(long, value_name = "PX", default_value = "0")]
+    #[arg(long, value_name = "PX", default_value = "0", conflicts_with = "video")]
     pub(crate) calibration_error: f64,
     /// Masks grown by so many pixels; negative shrinks
-    #[arg(long, value_name = "PX", default_value = "0", allow_negative_numbers = true)]
+    #[arg(long, value_name = "PX", default_value = "0", allow_negative_numbers = true, conflicts_with = "video")]
     pub(crate) mask_grow: f64,
     /// Round holes in every mask
-    #[arg(long, value_name = "N", default_value = "0")]
+    #[arg(long, value_name = "N", default_value = "0", conflicts_with = "video")]
     pub(crate) mask_holes: usize,
     /// Turn of the table while the shutter is open, in degrees
     #[arg(long, value_name = "DEG", default_value = "0")]
     pub(crate) motion_blur: f64,
     /// Radial distortion k1 of the lens, known
-    #[arg(long, value_name = "K1", default_value = "0", allow_negative_numbers = true)]
-    pub(crate) distortion: f64,
+    #[arg(long, value_name = "K1", allow_negative_numbers = true)]
+    pub(crate) distortion: Option<f64>,
 }
 
 /// What the light is fixed to.

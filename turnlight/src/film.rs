@@ -24,6 +24,11 @@ pub fn check(path: &Path) -> Result<(), Error> {
     }
 }
 
+/// Whether films of this name have frames of even sides only: their codecs store colour for blocks of 2 × 2.
+pub fn needs_even_sides(path: &Path) -> bool {
+    !matches!(extension(path).as_str(), "png" | "apng")
+}
+
 /// Writes RGBA frames of one size as a film, one in memory at a time. Animated PNGs keep the alpha; other kinds have
 /// none, and what is transparent is black there.
 ///

@@ -10,6 +10,7 @@ pub(crate) mod info;
 pub(crate) mod model;
 pub(crate) mod render;
 pub(crate) mod synth;
+mod synth_film;
 
 use crate::arguments::{CaptureArgs, FitArgs, MeshArgs, MethodArg, ShapeArgs};
 use std::path::Path;

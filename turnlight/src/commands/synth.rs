@@ -8,29 +8,35 @@ use turnlight::Error;
 use turnlight::data_synth::{
     Effort, Faults, Layout, LightFrame, Scene, SensorNoise, SynthCapture, SynthError, SynthOptions, synthesize_with,
 };
-use turnlight::film;
 use turnlight::stages::{Observer, Stages};
 
-/// Frames per second of the film.
-const FPS: f64 = 12.0;
+/// Views, where none are asked for.
+const VIEWS: usize = 48;
+/// Paths per pixel, where none are asked for.
+const SAMPLES: u32 = 32;
+/// Turns of a spiral, where none are asked for.
+const TURNS: f64 = 5.0;
 
 pub(crate) fn run(args: &SynthArgs, observer: &dyn Observer) -> Result<Answer, Error> {
+    if let Some(video) = &args.footage.video {
+        return super::synth_film::run(args, video, observer);
+    }
     let scene: Scene = args.scene.parse().map_err(|fault| Error::Arguments(format!("{fault}")))?;
     let [width, height] = args.size;
     refuse_occupied(&args.output)?;
-    args.video.as_deref().map(film::check).transpose()?;
+    let views = args.views.unwrap_or(VIEWS);
     let filming = &args.filming;
     let options = SynthOptions {
-        views: args.views,
+        views,
         width,
         height,
         seed: args.seed,
-        effort: filming.noise.map_or(Effort::Samples(filming.samples), Effort::Noise),
+        effort: filming.noise.map_or(Effort::Samples(filming.samples.unwrap_or(SAMPLES)), Effort::Noise),
         light: match filming.light {
             LightArg::Room => LightFrame::Room,
             LightArg::Object => LightFrame::Object,
         },
-        layout: layout(filming, args.views)?,
+        layout: layout(filming, views)?,
         faults: faults(&args.faults),
         maps: filming.maps,
         ..SynthOptions::default()
@@ -38,28 +44,20 @@ pub(crate) fn run(args: &SynthArgs, observer: &dyn Observer) -> Result<Answer, E
     let mut stages = Stages::new(observer);
     let filmed = film(scene, &options, &mut stages)?;
     stages.run("write", |_| filmed.write(&args.output))?;
-    if let Some(video) = &args.video {
-        let frames: Vec<_> = filmed.views.iter().map(|v| v.image.map(|[r, g, b]| [r, g, b, 255])).collect();
-        stages.run("write film", |_| film::write_film(video, frames, FPS))?;
-    }
-    let mut text = format!("{}: {} views of {width} × {height}", scene.name(), args.views);
+    let mut text = format!("{}: {views} views of {width} × {height}", scene.name());
     if let Some(noise) = filmed.report.noise_rms {
         text.push_str(&format!(", noise {noise:.1}/255"));
     }
     text.push_str(&format!("\nwrote {}", args.output.display()));
-    if let Some(video) = &args.video {
-        text.push_str(&format!("\nwrote {}", video.display()));
-    }
     let json = json!({
         "scene": scene.name(),
-        "views": args.views,
+        "views": views,
         "width": width,
         "height": height,
         "seed": args.seed,
         "noise_rms_levels": filmed.report.noise_rms,
         "rays": filmed.report.rays,
         "capture": args.output,
-        "video": args.video,
         "stages": stages.finished(),
     });
     Ok(Answer { text, json })
@@ -67,15 +65,15 @@ pub(crate) fn run(args: &SynthArgs, observer: &dyn Observer) -> Result<Answer, E
 
 /// Where the cameras stand; without elevations given, the usual ones, or as many as there are views for.
 fn layout(filming: &FilmingArgs, views: usize) -> Result<Layout, Error> {
-    let given = filming.elevations.as_deref();
+    let (given, turns) = (filming.elevations.as_deref(), filming.turns.unwrap_or(TURNS));
     match (filming.layout, given) {
         (LayoutArg::Rings, Some(rings)) => Ok(Layout::Rings { elevations_deg: rings.to_vec() }),
         (LayoutArg::Rings, None) => {
             let usual = [12.0, 35.0];
             Ok(Layout::Rings { elevations_deg: usual[..views.clamp(1, usual.len())].to_vec() })
         }
-        (LayoutArg::Spiral, None) => Ok(Layout::Spiral { from_deg: 0.0, to_deg: 60.0, turns: filming.turns }),
-        (LayoutArg::Spiral, Some(&[from_deg, to_deg])) => Ok(Layout::Spiral { from_deg, to_deg, turns: filming.turns }),
+        (LayoutArg::Spiral, None) => Ok(Layout::Spiral { from_deg: 0.0, to_deg: 60.0, turns }),
+        (LayoutArg::Spiral, Some(&[from_deg, to_deg])) => Ok(Layout::Spiral { from_deg, to_deg, turns }),
         (LayoutArg::Spiral, Some(_)) => {
             Err(Error::Arguments("--elevations: a spiral has two, of its first and its last view".to_owned()))
         }
@@ -87,16 +85,21 @@ fn layout(filming: &FilmingArgs, views: usize) -> Result<Layout, Error> {
     }
 }
 
+/// A sensor that is white at this many electrons.
+pub(super) fn sensor(full_well: f64) -> SensorNoise {
+    SensorNoise { full_well, read_electrons: 10.0 }
+}
+
 fn faults(args: &FaultArgs) -> Faults {
     Faults {
-        sensor_noise: args.sensor_noise.map(|full_well| SensorNoise { full_well, read_electrons: 10.0 }),
-        exposure_drift_stops: args.exposure_drift,
+        sensor_noise: args.sensor_noise.map(sensor),
+        exposure_drift_stops: args.exposure_drift.unwrap_or(0.0),
         camera_jitter_deg: args.jitter,
         calibration_error_px: args.calibration_error,
         matte_grow_px: args.mask_grow,
         matte_holes: args.mask_holes,
         motion_blur_deg: args.motion_blur,
-        distortion_k1: args.distortion,
+        distortion_k1: args.distortion.unwrap_or(0.0),
     }
 }
 
