@@ -109,10 +109,11 @@ impl Faults {
         (stops * self.exposure_drift_stops).exp2()
     }
 
-    /// The picture as the sensor gives it, 8-bit sRGB.
+    /// The picture as the sensor gives it, 8-bit sRGB. White is where the encoding ends: what is brighter stays
+    /// white whatever its noise.
     pub(crate) fn develop(&self, picture: &Picture, seed: u64, view: usize) -> Image<[u8; 3]> {
         let gain = self.exposure(seed, view) as f32;
-        let mut linear = picture.radiance.map(|p| p.map(|c| (c * gain).min(1.0)));
+        let mut linear = picture.radiance.map(|p| p.map(|c| c * gain));
         if let Some(sensor) = self.sensor_noise {
             sensor.apply(&mut linear, seed, view);
         }
@@ -213,6 +214,24 @@ mod tests {
         let expected = (f64::from(level) * 2000.0 + 100.0).sqrt() / 2000.0;
         assert!((mean - f64::from(level)).abs() < 4.0 * expected / 200.0);
         assert!((sigma / expected - 1.0).abs() < 0.02, "{sigma} against {expected}");
+    }
+
+    #[test]
+    fn what_is_brighter_than_white_stays_white_whatever_its_noise() {
+        let noise = SensorNoise { full_well: 100.0, read_electrons: 10.0 };
+        let faults = Faults { sensor_noise: Some(noise), ..Faults::default() };
+        let flat = |value: f32| Picture {
+            radiance: Image::filled(40, 40, [value; 3]),
+            coverage: Image::filled(40, 40, 1.0),
+            noise: Image::filled(40, 40, 0.0),
+            depth: Image::filled(40, 40, 1.0),
+            normal: Image::filled(40, 40, [0.0, 0.0, 1.0]),
+            rays: 0,
+            noise_rms: None,
+        };
+        let white = |value| faults.develop(&flat(value), 1, 0).pixels().iter().filter(|p| **p == [255; 3]).count();
+        assert_eq!(white(4.0), 1600);
+        assert!(white(1.0) < 800);
     }
 
     #[test]
