@@ -168,7 +168,7 @@ pub fn synthesize_with(
     let rig = LightRig::studio(aabb.center().coords.cast(), 0.5 * aabb.diagonal() as f32);
     let shutter_rad = options.faults.motion_blur_deg.to_radians();
     let limits = PathLimits { surfaces: options.surfaces };
-    let mut film = Film::new(options, &aabb);
+    let mut film = Film::new(options, &built.mesh, &aabb);
     for (view, (station, camera)) in stations.iter().zip(&cameras).enumerate() {
         let rig = &rig_for(&rig, options.light, station);
         let (effort, seed) = (options.effort, options.seed);
@@ -182,6 +182,7 @@ pub fn synthesize_with(
 /// What has been filmed so far.
 struct Film<'a> {
     options: &'a SynthOptions,
+    mesh: &'a Mesh,
     target: Vector3<f64>,
     views: Vec<View>,
     truths: Vec<ViewTruth>,
@@ -190,10 +191,10 @@ struct Film<'a> {
 }
 
 impl<'a> Film<'a> {
-    fn new(options: &'a SynthOptions, aabb: &Aabb) -> Self {
+    fn new(options: &'a SynthOptions, mesh: &'a Mesh, aabb: &Aabb) -> Self {
         let report = SynthReport { rays: 0, noise_rms: None };
         let target = aabb.center().coords;
-        Self { options, target, views: Vec::new(), truths: Vec::new(), light_directions: Vec::new(), report }
+        Self { options, mesh, target, views: Vec::new(), truths: Vec::new(), light_directions: Vec::new(), report }
     }
 
     fn take(&mut self, camera: &Camera, exposure: &Exposure<'_>) {
@@ -208,11 +209,17 @@ impl<'a> Film<'a> {
             name: format!("{view:04}"),
             image: faults.develop(&picture, seed, view),
             matte: faults.cut(&picture.coverage, seed, view),
-            is_complete: true,
+            is_complete: self.holds_whole(&camera),
             camera: faults.believed_camera(&camera, seed, view),
         });
         let maps = self.options.maps.then(|| TruthMaps::from(picture));
         self.truths.push(ViewTruth { camera, exposure: faults.exposure(seed, view), maps });
+    }
+
+    /// Whether all of the object is in the frame: a camera that stands off may cut it.
+    fn holds_whole(&self, camera: &Camera) -> bool {
+        let is_in = |p| camera.project(p).is_some_and(|q| camera.in_frame(q.pixel));
+        self.mesh.positions.iter().all(is_in)
     }
 
     /// Adds up rays, and noise as a mean of squares over views.
@@ -282,6 +289,20 @@ mod tests {
         // One view per ring, half a turn apart (the odd ring starts half a step later).
         assert!((room.light_directions[0].x + room.light_directions[1].x).abs() < 1e-6);
         assert!((object.light_directions[0] - object.light_directions[1]).norm() < 1e-9);
+    }
+
+    #[test]
+    fn a_camera_that_cuts_the_object_is_known() {
+        let (options, mesh) = (small(), crate::shape::sphere(0.1, 16));
+        let aabb = mesh.aabb().unwrap();
+        let film = Film::new(&options, &mesh, &aabb);
+        let stations = stations(&options.layout, options.views, 0).unwrap();
+        let camera = cameras(&stations, &mesh, &aabb, [48, 36])[0];
+        assert!(film.holds_whole(&camera));
+        // The ball is as high as 92 % of the frame: an eighth of its height aside, it is cut.
+        let mut aside = camera;
+        aside.translation.y += 0.025;
+        assert!(!film.holds_whole(&aside));
     }
 
     #[test]
