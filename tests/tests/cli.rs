@@ -488,10 +488,16 @@ fn synth_films_as_asked_and_keeps_the_truth_beside() {
 fn synth_names_the_option_that_is_out_of_range() {
     let place = tempfile::tempdir().expect("a folder");
     let with = |more: &[&'static str]| [&["synth", "mug", "-o", "s", "--views", "2"], more].concat();
-    assert_fails(place.path(), &with(&["--jitter", "NaN"]), &["camera_jitter_deg"]);
-    assert_fails(place.path(), &with(&["--elevations", "95"]), &["elevation"]);
-    for wrong in [&["--noise", "0"][..], &["--noise", "2", "--samples", "8"], &["--light", "moon"]] {
+    for (wrong, word) in [
+        (&["--jitter", "NaN"][..], "camera_jitter_deg"),
+        (&["--elevations", "95"], "elevation"),
+        (&["--noise", "0"], "--noise"),
+        (&["--noise", "2", "--samples", "8"], "--samples"),
+        (&["--light", "moon"], "--light"),
+        (&["--turns", "3"], "--layout spiral"),
+    ] {
         let run = turnlight(place.path(), &with(wrong));
         assert_eq!(run.code, Some(2), "{wrong:?}: {}", run.stderr);
+        assert!(run.stderr.contains(word), "{wrong:?}: {}", run.stderr);
     }
 }

@@ -309,7 +309,7 @@ pub(crate) struct RenderArgs {
 
 #[derive(Debug, Args)]
 pub(crate) struct SynthArgs {
-    /// The scene
+    /// The scene: temple, elephant, house, wreath, mug, chrome, plate, knot, noise, glass, blank or jade
     pub(crate) scene: String,
     /// The capture to write
     #[arg(short, long, value_name = "DIR")]
@@ -345,13 +345,14 @@ pub(crate) struct FilmingArgs {
     /// Elevations in degrees: of the rings; of the spiral's ends; the lowest of random cameras
     #[arg(long, value_name = "DEG,..", value_delimiter = ',', allow_negative_numbers = true)]
     pub(crate) elevations: Option<Vec<f64>>,
-    /// Full turns of the spiral
-    #[arg(long, value_name = "N", default_value = "5", value_parser = turns)]
-    pub(crate) turns: f64,
+    /// Full turns of the spiral [default: 5]
+    #[arg(long, value_name = "N", value_parser = turns)]
+    pub(crate) turns: Option<f64>,
     /// Paths of light per pixel
     #[arg(long, value_name = "N", default_value = "8", value_parser = samples)]
     pub(crate) samples: u32,
-    /// Trace as many paths as it takes for this noise over the object, in levels of 255 (instead of --samples)
+    /// Trace as many paths as it takes for this noise over the object, in levels of 255 (instead of --samples); at
+    /// most 4096 on a pixel
     #[arg(long, value_name = "LEVELS", value_parser = levels, conflicts_with = "samples")]
     pub(crate) noise: Option<f64>,
     /// Write radiance, depth, normals and noise of every view as truth/NNNN.exr

@@ -13,6 +13,8 @@ use turnlight::stages::{Observer, Stages};
 
 /// Frames per second of the film.
 const FPS: f64 = 12.0;
+/// Full turns of a spiral, where nobody says.
+const SPIRAL_TURNS: f64 = 5.0;
 
 pub(crate) fn run(args: &SynthArgs, observer: &dyn Observer) -> Result<Answer, Error> {
     let scene: Scene = args.scene.parse().map_err(|fault| Error::Arguments(format!("{fault}")))?;
@@ -68,14 +70,18 @@ pub(crate) fn run(args: &SynthArgs, observer: &dyn Observer) -> Result<Answer, E
 /// Where the cameras stand; without elevations given, the usual ones, or as many as there are views for.
 fn layout(filming: &FilmingArgs, views: usize) -> Result<Layout, Error> {
     let given = filming.elevations.as_deref();
+    if filming.turns.is_some() && !matches!(filming.layout, LayoutArg::Spiral) {
+        return Err(Error::Arguments("--turns: only a spiral has turns; add --layout spiral".to_owned()));
+    }
+    let turns = filming.turns.unwrap_or(SPIRAL_TURNS);
     match (filming.layout, given) {
         (LayoutArg::Rings, Some(rings)) => Ok(Layout::Rings { elevations_deg: rings.to_vec() }),
         (LayoutArg::Rings, None) => {
             let usual = [12.0, 35.0];
             Ok(Layout::Rings { elevations_deg: usual[..views.clamp(1, usual.len())].to_vec() })
         }
-        (LayoutArg::Spiral, None) => Ok(Layout::Spiral { from_deg: 0.0, to_deg: 60.0, turns: filming.turns }),
-        (LayoutArg::Spiral, Some(&[from_deg, to_deg])) => Ok(Layout::Spiral { from_deg, to_deg, turns: filming.turns }),
+        (LayoutArg::Spiral, None) => Ok(Layout::Spiral { from_deg: 0.0, to_deg: 60.0, turns }),
+        (LayoutArg::Spiral, Some(&[from_deg, to_deg])) => Ok(Layout::Spiral { from_deg, to_deg, turns }),
         (LayoutArg::Spiral, Some(_)) => {
             Err(Error::Arguments("--elevations: a spiral has two, of its first and its last view".to_owned()))
         }
