@@ -109,7 +109,8 @@ impl Faults {
         (stops * self.exposure_drift_stops).exp2()
     }
 
-    /// The picture as the sensor gives it, 8-bit sRGB.
+    /// The picture as the sensor gives it, 8-bit sRGB. White is where the encoding ends: what is brighter stays
+    /// white whatever its noise.
     pub(crate) fn develop(&self, picture: &Picture, seed: u64, view: usize) -> Image<[u8; 3]> {
         develop(&picture.radiance, self.exposure(seed, view), self.sensor_noise, seed, view)
     }
@@ -142,7 +143,7 @@ pub(crate) fn develop(
     seed: u64,
     view: usize,
 ) -> Image<[u8; 3]> {
-    let mut linear = radiance.map(|p| p.map(|c| (c * gain as f32).min(1.0)));
+    let mut linear = radiance.map(|p| p.map(|c| c * gain as f32));
     if let Some(sensor) = noise {
         sensor.apply(&mut linear, seed, view);
     }
@@ -226,6 +227,24 @@ mod tests {
     }
 
     #[test]
+    fn what_is_brighter_than_white_stays_white_whatever_its_noise() {
+        let noise = SensorNoise { full_well: 100.0, read_electrons: 10.0 };
+        let faults = Faults { sensor_noise: Some(noise), ..Faults::default() };
+        let flat = |value: f32| Picture {
+            radiance: Image::filled(40, 40, [value; 3]),
+            coverage: Image::filled(40, 40, 1.0),
+            noise: Image::filled(40, 40, 0.0),
+            depth: Image::filled(40, 40, 1.0),
+            normal: Image::filled(40, 40, [0.0, 0.0, 1.0]),
+            rays: 0,
+            noise_rms: None,
+        };
+        let white = |value| faults.develop(&flat(value), 1, 0).pixels().iter().filter(|p| **p == [255; 3]).count();
+        assert_eq!(white(4.0), 1600);
+        assert!(white(1.0) < 800);
+    }
+
+    #[test]
     fn a_calibration_error_moves_the_middle_by_its_pixels() {
         let faults = Faults { calibration_error_px: 0.5, ..Faults::default() };
         let camera = camera();
@@ -272,7 +291,9 @@ mod tests {
                 1200.0 - faults.cut(&coverage, seed, 0).pixels().iter().map(|&m| f64::from(m) / 255.0).sum::<f64>()
             })
             .sum();
-        assert!(holes > 0.0);
+        // Sixty holes of radius 2 in an 80 × 60 picture, a quarter of it object: overlaps and borders take little.
+        let expected = 60.0 * std::f64::consts::PI * 4.0 * 0.25;
+        assert!((holes / expected - 1.0).abs() < 0.4, "{holes} against {expected}");
     }
 
     #[test]

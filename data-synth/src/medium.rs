@@ -1,7 +1,7 @@
 //! A body in which light is scattered, seen from outside: where light that enters comes out again.
 //!
 //! Light leaves around the point it enters by the diffusion profile of Christensen and Burley
-//! ("Approximate Reflectance Profiles for Efficient Subsurface Scattering", 2015, eq. 3 and 8, diffuse
+//! ("Approximate Reflectance Profiles for Efficient Subsurface Scattering", 2015, eq. 3 and 6, diffuse
 //! transmission), by colour channel, `r` the straight distance, `ℓ` the mean free path:
 //!
 //! ```text

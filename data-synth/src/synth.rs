@@ -50,6 +50,8 @@ pub struct SynthOptions {
 pub struct SynthCapture {
     /// What was filmed.
     pub scene: Scene,
+    /// How.
+    pub options: SynthOptions,
     /// Pictures, mattes and cameras: exact, unless [`SynthOptions::faults`] says otherwise.
     pub views: Vec<View>,
     /// What the views do not show, one per view.
@@ -168,32 +170,39 @@ pub fn synthesize_with(
     let rig = LightRig::studio(aabb.center().coords.cast(), 0.5 * aabb.diagonal() as f32);
     let shutter_rad = options.faults.motion_blur_deg.to_radians();
     let limits = PathLimits { surfaces: options.surfaces };
-    let mut film = Film::new(options, &aabb);
+    let mut film = Film::new(options, &built.mesh, &aabb);
     for (view, (station, camera)) in stations.iter().zip(&cameras).enumerate() {
         let rig = &rig_for(&rig, options.light, station);
         let (effort, seed) = (options.effort, options.seed);
-        film.take(camera, &Exposure { world: &built.world, rig, limits, effort, seed, view, shutter_rad });
+        let lights_stay = options.light == LightFrame::Room;
+        let world = &built.world;
+        film.take(camera, &Exposure { world, rig, limits, effort, seed, view, shutter_rad, lights_stay });
         progress(view + 1, options.views);
     }
     let Film { views, truths, light_directions, report, .. } = film;
-    Ok(SynthCapture { scene, views, truths, light_directions, mesh: built.mesh, aabb, report })
+    let options = options.clone();
+    Ok(SynthCapture { scene, options, views, truths, light_directions, mesh: built.mesh, aabb, report })
 }
 
 /// What has been filmed so far.
 struct Film<'a> {
     options: &'a SynthOptions,
+    mesh: &'a Mesh,
     target: Vector3<f64>,
     views: Vec<View>,
     truths: Vec<ViewTruth>,
     light_directions: Vec<Vector3<f64>>,
     report: SynthReport,
+    /// Views whose noise is in the report.
+    judged: usize,
 }
 
 impl<'a> Film<'a> {
-    fn new(options: &'a SynthOptions, aabb: &Aabb) -> Self {
+    fn new(options: &'a SynthOptions, mesh: &'a Mesh, aabb: &Aabb) -> Self {
         let report = SynthReport { rays: 0, noise_rms: None };
         let target = aabb.center().coords;
-        Self { options, target, views: Vec::new(), truths: Vec::new(), light_directions: Vec::new(), report }
+        let (views, truths, light_directions) = (Vec::new(), Vec::new(), Vec::new());
+        Self { options, mesh, target, views, truths, light_directions, report, judged: 0 }
     }
 
     fn take(&mut self, camera: &Camera, exposure: &Exposure<'_>) {
@@ -208,19 +217,26 @@ impl<'a> Film<'a> {
             name: format!("{view:04}"),
             image: faults.develop(&picture, seed, view),
             matte: faults.cut(&picture.coverage, seed, view),
-            is_complete: true,
+            is_complete: self.holds_whole(&camera),
             camera: faults.believed_camera(&camera, seed, view),
         });
         let maps = self.options.maps.then(|| TruthMaps::from(picture));
         self.truths.push(ViewTruth { camera, exposure: faults.exposure(seed, view), maps });
     }
 
-    /// Adds up rays, and noise as a mean of squares over views.
+    /// Whether all of the object is in the frame: a camera that stands off may cut it.
+    fn holds_whole(&self, camera: &Camera) -> bool {
+        let is_in = |p| camera.project(p).is_some_and(|q| camera.in_frame(q.pixel));
+        self.mesh.positions.iter().all(is_in)
+    }
+
+    /// Adds up rays, and noise as a mean of squares over the views that show any of the object.
     fn count(&mut self, picture: &Picture) {
         self.report.rays += picture.rays;
-        let taken = self.views.len() as f64;
-        let before = self.report.noise_rms.map_or(0.0, |n| n * n * taken);
-        self.report.noise_rms = picture.noise_rms.map(|n| ((before + n * n) / (taken + 1.0)).sqrt());
+        let Some(noise) = picture.noise_rms else { return };
+        let before = self.report.noise_rms.map_or(0.0, |n| n * n * self.judged as f64);
+        self.judged += 1;
+        self.report.noise_rms = Some(((before + noise * noise) / self.judged as f64).sqrt());
     }
 }
 
@@ -282,6 +298,20 @@ mod tests {
         // One view per ring, half a turn apart (the odd ring starts half a step later).
         assert!((room.light_directions[0].x + room.light_directions[1].x).abs() < 1e-6);
         assert!((object.light_directions[0] - object.light_directions[1]).norm() < 1e-9);
+    }
+
+    #[test]
+    fn a_camera_that_cuts_the_object_is_known() {
+        let (options, mesh) = (small(), crate::shape::sphere(0.1, 16));
+        let aabb = mesh.aabb().unwrap();
+        let film = Film::new(&options, &mesh, &aabb);
+        let stations = stations(&options.layout, options.views, 0).unwrap();
+        let camera = cameras(&stations, &mesh, &aabb, [48, 36])[0];
+        assert!(film.holds_whole(&camera));
+        // The ball is as high as 92 % of the frame: an eighth of its height aside, it is cut.
+        let mut aside = camera;
+        aside.translation.y += 0.025;
+        assert!(!film.holds_whole(&aside));
     }
 
     #[test]

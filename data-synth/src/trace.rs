@@ -4,7 +4,9 @@
 //! light is hidden), later to one light picked by what it might give; then one ray is scattered. The two
 //! ways of finding a light are combined by the power heuristic (Veach 1997, chapter 9). The sky is found
 //! by scattering alone: it is smooth. Paths end by Russian roulette on what they may still carry, so the
-//! mean is unbiased; [`PathLimits`] bounds them only where asked to.
+//! mean is unbiased but for what [`PathLimits`], [`MAX_PASSAGES`] and [`MAX_CROSSINGS`] cut, and for paths that a
+//! smooth normal sends to the wrong side of a facet of glass. Lights do not hide one another from shadow rays: rigs
+//! keep them apart.
 
 use crate::accel::{Accel, Hit};
 use crate::footage::{SET, Set};
@@ -215,7 +217,9 @@ impl World {
             AXIS_ODDS[k] * profile.pdf(aside) * normal[k].abs()
         };
         let pdf: f32 = (0..3).map(found).sum();
-        let is_near = offset.norm() < profile.reach() && pdf > 0.0;
+        // Light enters where the body is bare: not through what is opaque.
+        let is_bare = matches!(self.finish(face), Finish::Translucent(..));
+        let is_near = is_bare && offset.norm() < profile.reach() && pdf > 0.0;
         if is_near { profile.density(offset.norm()) / pdf } else { Vec3::zeros() }
     }
 

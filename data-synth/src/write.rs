@@ -8,7 +8,8 @@
 //! world, `noise` the renderer's standard error in levels of 255 of sRGB. 32-bit floats.
 
 use crate::error::SynthError;
-use crate::synth::{SynthCapture, TruthMaps};
+use crate::film::Effort;
+use crate::synth::{LightFrame, SynthCapture, TruthMaps};
 use capture::{Aabb, Camera, Image, View};
 use exr::prelude::{AnyChannel, AnyChannels, FlatSamples, Vec2, WritableImage};
 use geometry::Mesh;
@@ -122,8 +123,29 @@ impl SynthCapture {
                 "maps": truth.maps.is_some().then(|| truth_path(&view.name)),
             })
         };
+        let (options, faults) = (&self.options, &self.options.faults);
+        let (samples, noise) = match options.effort {
+            Effort::Samples(samples) => (Some(samples), None),
+            Effort::Noise(levels) => (None, Some(levels)),
+        };
         json!({
             "scene": self.scene.name(),
+            "seed": options.seed,
+            "samples": samples,
+            "noise_levels": noise,
+            "surfaces": options.surfaces,
+            "light": match options.light { LightFrame::Room => "room", LightFrame::Object => "object" },
+            "faults": {
+                "sensor_full_well_electrons": faults.sensor_noise.map(|n| n.full_well),
+                "sensor_read_electrons": faults.sensor_noise.map(|n| n.read_electrons),
+                "exposure_drift_stops": faults.exposure_drift_stops,
+                "camera_jitter_deg": faults.camera_jitter_deg,
+                "calibration_error_px": faults.calibration_error_px,
+                "matte_grow_px": faults.matte_grow_px,
+                "matte_holes": faults.matte_holes,
+                "motion_blur_deg": faults.motion_blur_deg,
+                "distortion_k1": faults.distortion_k1,
+            },
             "noise_rms_levels": self.report.noise_rms,
             "frames": self.views.iter().zip(&self.truths).map(frame).collect::<Vec<_>>(),
         })

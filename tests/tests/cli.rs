@@ -499,10 +499,33 @@ fn synth_films_as_asked_and_keeps_the_truth_beside() {
 fn synth_names_the_option_that_is_out_of_range() {
     let place = tempfile::tempdir().expect("a folder");
     let with = |more: &[&'static str]| [&["synth", "mug", "-o", "s", "--views", "2"], more].concat();
-    assert_fails(place.path(), &with(&["--jitter", "NaN"]), &["camera_jitter_deg"]);
-    assert_fails(place.path(), &with(&["--elevations", "95"]), &["elevation"]);
-    for wrong in [&["--noise", "0"][..], &["--noise", "2", "--samples", "8"], &["--light", "moon"]] {
+    for (wrong, word) in [
+        (&["--jitter", "NaN"][..], "camera_jitter_deg"),
+        (&["--elevations", "95"], "elevation"),
+        (&["--noise", "0"], "--noise"),
+        (&["--noise", "2", "--samples", "8"], "--samples"),
+        (&["--light", "moon"], "--light"),
+        (&["--turns", "3"], "--layout spiral"),
+    ] {
         let run = turnlight(place.path(), &with(wrong));
         assert_eq!(run.code, Some(2), "{wrong:?}: {}", run.stderr);
+        assert!(run.stderr.contains(word), "{wrong:?}: {}", run.stderr);
     }
+}
+
+#[test]
+fn btf_synth_writes_a_material_whole_or_not_at_all() {
+    let place = tempfile::tempdir().expect("a folder");
+    let args = ["btf", "synth", "analytic", "-o", "material", "--size", "4", "--samples", "1", "--json", "--quiet"];
+    let run = turnlight(place.path(), &args);
+    assert_eq!(run.code, Some(0), "{}", run.stderr);
+    serde_json::from_str::<Value>(&run.stdout).expect("JSON");
+    let view = place.path().join("material/tv030_pv060");
+    assert_eq!(fs::read_dir(&view).expect("a view").count(), 81);
+    // Ring of 30 degrees: views 7, 8, 9, ...; the third of these is at 60 degrees of azimuth.
+    assert!(view.join("00009 tl000 pl000 tv030 pv060.png").exists());
+    assert_fails(place.path(), &args[..9], &["material"]);
+    let wrong = turnlight(place.path(), &["btf", "synth", "velvet", "-o", "other"]);
+    assert_eq!(wrong.code, Some(2), "{}", wrong.stderr);
+    assert!(wrong.stderr.contains("corduroy"), "{}", wrong.stderr);
 }

@@ -309,7 +309,7 @@ pub(crate) struct RenderArgs {
 
 #[derive(Debug, Args)]
 pub(crate) struct SynthArgs {
-    /// The scene
+    /// The scene: temple, elephant, house, wreath, mug, chrome, plate, knot, noise, glass, blank or jade
     pub(crate) scene: String,
     /// The capture to write
     #[arg(short, long, value_name = "DIR")]
@@ -365,7 +365,8 @@ pub(crate) struct FilmingArgs {
     /// Paths of light per pixel [default: 32, 8 of a film]
     #[arg(long, value_name = "N", value_parser = samples)]
     pub(crate) samples: Option<u32>,
-    /// Trace as many paths as it takes for this noise over the object, in levels of 255 (instead of --samples)
+    /// Trace as many paths as it takes for this noise over the object, in levels of 255 (instead of --samples); at
+    /// most 4096 on a pixel
     #[arg(long, value_name = "LEVELS", value_parser = levels, conflicts_with_all = ["samples", "video"])]
     pub(crate) noise: Option<f64>,
     /// Write radiance, depth, normals and noise of every view as truth/NNNN.exr
@@ -480,7 +481,7 @@ fn frames(text: &str) -> Result<usize, String> {
 }
 
 fn texels(text: &str) -> Result<usize, String> {
-    bounded(text, 4096)
+    bounded(text, 1024)
 }
 
 fn samples(text: &str) -> Result<u32, String> {

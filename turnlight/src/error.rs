@@ -32,6 +32,7 @@ pub enum Error {
 impl Error {
     /// What the process should return: 2 where the arguments are wrong, 1 otherwise.
     pub fn exit_code(&self) -> u8 {
-        if matches!(self, Self::Arguments(_)) { 2 } else { 1 }
+        let is_asked_wrongly = matches!(self, Self::Arguments(_) | Self::Synth(data_synth::SynthError::Option { .. }));
+        if is_asked_wrongly { 2 } else { 1 }
     }
 }

@@ -31,7 +31,7 @@ use trace::Tracing;
 /// How a material is measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BtfOptions {
-    /// Texels per side of the tile, 1 to 4096.
+    /// Texels per side of the tile, 1 to 1024: a view is held in memory, a gigabyte at most.
     pub size: usize,
     /// Of everything random; the same seed gives the same bytes.
     pub seed: u64,
@@ -77,7 +77,7 @@ impl BtfOptions {
                 || SynthError::Option { option, value: value.to_string(), allowed: format!("between 1 and {most}") };
             if ok { Ok(()) } else { Err(fault()) }
         };
-        within("size", self.size, 4096)?;
+        within("size", self.size, 1024)?;
         within("samples", self.samples as usize, 65_536)?;
         within("surfaces", self.surfaces, 16)
     }

@@ -7,7 +7,7 @@
 
 use super::patch::Patch;
 use crate::accel::{Accel, Hit};
-use crate::material::{Finish, Lobes, Surface, Vec3};
+use crate::material::{Finish, Lobes, Surface, Vec3, frame_around};
 use geometry::Mesh;
 use nalgebra::Vector3;
 
@@ -193,11 +193,4 @@ impl Copies {
 fn exit(at: f32, direction: f32, low: f32, high: f32) -> f32 {
     let border = if direction > 0.0 { high } else { low };
     if direction == 0.0 { f32::INFINITY } else { ((border - at) / direction).max(0.0) }
-}
-
-/// An orthonormal frame with the given z.
-fn frame_around(n: Vec3) -> [Vec3; 3] {
-    let aside = if n.x.abs() < 0.7 { Vec3::x() } else { Vec3::y() };
-    let tangent = aside.cross(&n).normalize();
-    [tangent, n.cross(&tangent), n]
 }

@@ -276,6 +276,7 @@ impl Footage {
             seed: options.seed,
             view: frame,
             shutter_rad: -options.motion_blur_deg.to_radians(),
+            lights_stay: true,
         };
         let shot = shot::shoot(camera, &exposure, options.samples, yaw);
         let image = develop(&shot.radiance, self.exposure(frame), options.sensor_noise, options.seed, frame);

@@ -121,7 +121,7 @@ impl Scene {
             Self::Noise => "a die printed with checks, noise and gratings at the sampling limit",
             Self::Glass => "a wine glass of clear crystal, seen through itself",
             Self::Blank => "a rabbit of plain white plaster, without texture",
-            Self::Jade => "a carved jade turtle that light walks through",
+            Self::Jade => "a carved jade turtle that light passes through",
         }
     }
 

@@ -146,10 +146,12 @@ impl Sides {
         let faces: Vec<Vector3<f64>> = (0..mesh.faces.len()).map(|f| unit_normal(mesh, f)).collect();
         let mut half_edges: Vec<(u32, u32, usize)> = (0..3 * faces.len())
             .map(|h| (ids_of(h / 3)[h % 3], ids_of(h / 3)[(h % 3 + 1) % 3], h))
+            // A face fallen into a line has an edge from a vertex to itself, which is no border.
+            .filter(|(a, b, _)| a != b)
             .map(|(a, b, h)| (a.min(b), a.max(b), h))
             .collect();
         half_edges.sort_unstable();
-        let mut edges = vec![None; half_edges.len()];
+        let mut edges = vec![None; 3 * faces.len()];
         let mut vertices = vec![Some(Vector3::zeros()); mesh.positions.len()];
         for edge in half_edges.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)) {
             if let [(a, b, _)] = *edge {
@@ -235,6 +237,16 @@ mod tests {
         let [whole, soup] = [whole, soup].map(|mesh| Surface::new(&mesh).unwrap().nearest(&p));
         assert_eq!(whole, soup);
         assert!((whole.signed.unwrap() - 0.14_f64.sqrt()).abs() < 1e-15);
+    }
+
+    #[test]
+    fn a_face_fallen_into_a_line_is_no_hole() {
+        let mut mesh = tetrahedron();
+        let p = Point3::new(-1.0, -1.0, -1.0);
+        let whole = Surface::new(&mesh).unwrap().nearest(&p);
+        mesh.faces.push([0, 0, 1]);
+        assert_eq!(Surface::new(&mesh).unwrap().nearest(&p), whole);
+        assert!(whole.signed.is_some());
     }
 
     #[test]

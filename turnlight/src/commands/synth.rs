@@ -65,7 +65,11 @@ pub(crate) fn run(args: &SynthArgs, observer: &dyn Observer) -> Result<Answer, E
 
 /// Where the cameras stand; without elevations given, the usual ones, or as many as there are views for.
 fn layout(filming: &FilmingArgs, views: usize) -> Result<Layout, Error> {
-    let (given, turns) = (filming.elevations.as_deref(), filming.turns.unwrap_or(TURNS));
+    let given = filming.elevations.as_deref();
+    if filming.turns.is_some() && !matches!(filming.layout, LayoutArg::Spiral) {
+        return Err(Error::Arguments("--turns: only a spiral has turns; add --layout spiral".to_owned()));
+    }
+    let turns = filming.turns.unwrap_or(TURNS);
     match (filming.layout, given) {
         (LayoutArg::Rings, Some(rings)) => Ok(Layout::Rings { elevations_deg: rings.to_vec() }),
         (LayoutArg::Rings, None) => {
