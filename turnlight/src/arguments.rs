@@ -561,9 +561,10 @@ mod tests {
             assert!(size(text).is_err(), "{text}");
         }
         for text in ["nan", "inf", "-1", "1 mm"] {
-            assert!(length(text).is_err(), "{text}");
+            assert!(tolerance(text).is_err(), "{text}");
         }
-        assert_eq!(length("1.25e-3"), Ok(0.00125));
+        assert_eq!(tolerance("1.25e-3"), Ok(0.00125));
+        assert_eq!(length("30mm"), Ok(0.03));
         assert_eq!(axis("-y"), Ok([0.0, -1.0, 0.0]));
     }
 }
