@@ -1,6 +1,6 @@
 //! What can go wrong, by whose fault, with the remedy in the message.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// A fault in what was asked of the synthesizer, or in writing its result.
 #[derive(Debug, thiserror::Error)]
@@ -67,4 +67,10 @@ pub enum SynthError {
         /// What the encoder said.
         source: exr::error::Error,
     },
+}
+
+/// Turns a fault of the system into one that names the file.
+pub(crate) fn io_error(path: &Path) -> impl FnOnce(std::io::Error) -> SynthError {
+    let path = path.to_owned();
+    move |source| SynthError::Io { path, source }
 }

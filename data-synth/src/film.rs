@@ -25,7 +25,7 @@ const PILOT: u32 = 16;
 /// Pictures a pixel's samples are divided into to see how much they differ.
 const BATCHES: u32 = 4;
 /// The square of the error falls as this power of the number of samples: faster than the first, for more
-/// samples are stratified finer (measured on the temple between 16 and 128: 1.08 to 1.1).
+/// samples are stratified finer (two seeds of the temple: 1.09 from 16 to 64, 1.07 from 16 to 128).
 const GAIN: f64 = 1.08;
 /// Aimed at below the noise asked for: a pilot may err by so much.
 const MARGIN: f64 = 0.97;

@@ -7,7 +7,7 @@
 //! `Z` distance along the optical axis in metres (infinite off the object), `NX NY NZ` the unit normal in the
 //! world, `noise` the renderer's standard error in levels of 255 of sRGB. 32-bit floats.
 
-use crate::error::SynthError;
+use crate::error::{SynthError, io_error};
 use crate::film::Effort;
 use crate::synth::{LightFrame, SynthCapture, TruthMaps};
 use capture::{Aabb, Camera, Image, View};
@@ -252,11 +252,6 @@ fn is_occupied(dir: &Path) -> bool {
         Ok(mut entries) => entries.next().is_some(),
         Err(_) => dir.symlink_metadata().is_ok(),
     }
-}
-
-fn io_error(path: &Path) -> impl FnOnce(std::io::Error) -> SynthError {
-    let path = path.to_owned();
-    move |source| SynthError::Io { path, source }
 }
 
 #[cfg(test)]

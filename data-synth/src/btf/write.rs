@@ -10,7 +10,7 @@
 use super::directions::{BtfDirection, DIRECTIONS};
 use super::material::BtfMaterial;
 use super::{BtfOptions, BtfStudio};
-use crate::error::SynthError;
+use crate::error::{SynthError, io_error};
 use crate::film::encode;
 use image::{ExtendedColorType, ImageFormat};
 use rayon::prelude::*;
@@ -131,9 +131,4 @@ impl Folder {
         fs::write(path, out.get_ref()).map_err(io_error(path))?;
         Ok(out.get_ref().len() as u64)
     }
-}
-
-fn io_error(path: &Path) -> impl FnOnce(std::io::Error) -> SynthError {
-    let path = path.to_owned();
-    move |source| SynthError::Io { path, source }
 }
