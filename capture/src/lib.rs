@@ -19,6 +19,7 @@ mod capture_set;
 pub mod contour;
 pub mod doctor;
 mod error;
+pub mod footage;
 mod formats;
 mod image;
 mod load;

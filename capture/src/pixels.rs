@@ -1,6 +1,7 @@
 //! Image files in and out: 8-bit colour, mattes, and the errors that name the file.
 
 use crate::{CaptureError, Image};
+use ::image::metadata::Orientation;
 use ::image::{DynamicImage, ImageDecoder, ImageError, ImageReader};
 use std::path::Path;
 
@@ -22,6 +23,16 @@ pub(crate) fn has_transparency(path: &Path) -> bool {
 /// When the file is missing, truncated or of an unknown kind.
 pub fn read_rgb(path: &Path) -> Result<Image<[u8; 3]>, CaptureError> {
     Ok(split_alpha(&decode(path)?).0)
+}
+
+/// As [`read_rgb`], turned as the file's EXIF orientation says.
+pub(crate) fn read_rgb_upright(path: &Path) -> Result<Image<[u8; 3]>, CaptureError> {
+    let mut decoder = reader(path)?.into_decoder().map_err(|error| fault(path, error))?;
+    // What cannot be read of the notes beside the picture is as if nothing were noted.
+    let orientation = decoder.orientation().unwrap_or(Orientation::NoTransforms);
+    let mut image = DynamicImage::from_decoder(decoder).map_err(|error| fault(path, error))?;
+    image.apply_orientation(orientation);
+    Ok(split_alpha(&image).0)
 }
 
 /// As [`read_rgb`], with the alpha channel as a matte (255 everywhere without one).
