@@ -98,7 +98,8 @@ mod tests {
 
     #[test]
     fn numbers_in_names_are_counted_not_spelled() {
-        let mut names = ["image_10.jpg", "image_2.jpg", "Image_1.jpg", "image_010b.jpg", "a.jpg", "image.jpg", "é9", "é10"];
+        let mut names =
+            ["image_10.jpg", "image_2.jpg", "Image_1.jpg", "image_010b.jpg", "a.jpg", "image.jpg", "é9", "é10"];
         names.sort_by(|a, b| in_natural_order(a, b));
         let expected =
             ["a.jpg", "image.jpg", "Image_1.jpg", "image_2.jpg", "image_10.jpg", "image_010b.jpg", "é9", "é10"];

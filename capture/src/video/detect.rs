@@ -97,7 +97,7 @@ pub fn detect_board(image: &Image<[u8; 3]>, board: &Board) -> Result<BoardView, 
 }
 
 /// Rec. 601 luma, as photographs are encoded.
-fn grey(image: &Image<[u8; 3]>) -> Image<u8> {
+pub(super) fn grey(image: &Image<[u8; 3]>) -> Image<u8> {
     image.map(|[r, g, b]| ((299 * u32::from(r) + 587 * u32::from(g) + 114 * u32::from(b) + 500) / 1000) as u8)
 }
 
@@ -118,7 +118,7 @@ fn opencv_dictionary(dictionary: Dictionary) -> opencv::Result<Ptr<aruco::Dictio
     aruco::get_predefined_dictionary_i32(position as i32)
 }
 
-fn markers_in(
+pub(super) fn markers_in(
     grey: &Image<u8>,
     dictionary: Dictionary,
     refinement: aruco::CornerRefineMethod,
@@ -177,7 +177,7 @@ fn pairs_of(found: &[FoundMarker], known: &[crate::board::Marker]) -> Vec<(Point
 }
 
 /// From the board's plane (metres) to the image (pixels): 3 × 3, by least squares or robustly.
-fn homography(
+pub(super) fn homography(
     pairs: &[(Point2<f64>, Point2<f64>)],
     method: i32,
     tolerance: f64,
@@ -198,7 +198,7 @@ fn homography(
     Ok(Some(map))
 }
 
-fn apply(map: &Matrix3<f64>, p: &Point2<f64>) -> Option<Point2<f64>> {
+pub(super) fn apply(map: &Matrix3<f64>, p: &Point2<f64>) -> Option<Point2<f64>> {
     Point2::from_homogeneous(map * p.to_homogeneous())
 }
 
@@ -326,6 +326,23 @@ fn chessboard(grey: &Image<u8>, board: &Board) -> opencv::Result<BoardView> {
     Ok(view)
 }
 
+/// Inner corners across and down of a chessboard of any size that is seen whole; `None` without one.
+pub(super) fn chessboard_counts(grey: &Image<u8>) -> opencv::Result<Option<[usize; 2]>> {
+    if grey.width() < SMALLEST || grey.height() < SMALLEST {
+        return Ok(None);
+    }
+    let (mut corners, mut found) = (Vector::<Point2f>::new(), Mat::default());
+    let flags = calib3d::CALIB_CB_LARGER | calib3d::CALIB_CB_NORMALIZE_IMAGE;
+    let is_found = calib3d::find_chessboard_corners_sb_with_meta(
+        &matrix(grey)?,
+        Size::new(3, 3),
+        &mut corners,
+        flags,
+        &mut found,
+    )?;
+    Ok((is_found && found.cols() > 2 && found.rows() > 2).then(|| [found.cols() as usize, found.rows() as usize]))
+}
+
 /// OpenCV may start at any end of the pattern. Of the orders in which the grid can be read, the one in which the
 /// board is seen from its front and its squares are dark where they should be: `order[id]` is the position in
 /// `found`, with the homography from board to image.
@@ -379,4 +396,4 @@ fn is_from_front(map: &Matrix3<f64>, at: &Point2<f64>) -> bool {
 }
 
 #[cfg(test)]
-mod tests;
+pub(super) mod tests;

@@ -6,10 +6,12 @@
 mod detect;
 mod orientation;
 mod read;
+mod recognise;
 mod write;
 
 pub use detect::{BoardView, FoundMarker, detect_board, detect_markers, guess_dictionary};
 pub use read::{FilmFrame, FilmInfo, FilmReader, ReadOptions};
+pub use recognise::{Pattern, detect_pattern, recognise_pattern};
 pub use write::{Codec, FilmWriter, WriteOptions, Written};
 
 use crate::{CaptureError, Image};

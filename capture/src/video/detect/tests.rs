@@ -10,7 +10,7 @@ fn charuco() -> Board {
 }
 
 /// A camera half a metre in front of the board, tilted and rolled.
-fn camera(tilt: f64, roll: f64, distance: f64) -> Camera {
+pub(in crate::video) fn camera(tilt: f64, roll: f64, distance: f64) -> Camera {
     let intrinsics = Intrinsics {
         fx: 900.0,
         fy: 905.0,
@@ -32,7 +32,7 @@ fn camera(tilt: f64, roll: f64, distance: f64) -> Camera {
 }
 
 /// What the camera sees: 64 rays a pixel meet the printed plane.
-fn photograph(board: &Board, camera: &Camera) -> Image<[u8; 3]> {
+pub(in crate::video) fn photograph(board: &Board, camera: &Camera) -> Image<[u8; 3]> {
     let (width, height) = (camera.intrinsics.width, camera.intrinsics.height);
     let mut image = Image::filled(width, height, [0_u8; 3]);
     for y in 0..height {

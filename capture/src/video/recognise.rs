@@ -1,0 +1,188 @@
+//! Finds out what kind of board is in the pictures, by trying.
+
+use super::detect::{apply, chessboard_counts, grey, guess_dictionary, homography, markers_in};
+use super::{BoardView, FoundMarker, detect_board, detect_markers};
+use crate::board::{Board, Dictionary};
+use crate::{CaptureError, Image};
+use nalgebra::{Matrix3, Point2};
+use opencv::aruco::CornerRefineMethod;
+use rayon::prelude::*;
+
+/// What there is to find in every frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Pattern {
+    /// A board of known layout. Where its size was not given, lengths are in squares (of a grid: in markers).
+    Board(Board),
+    /// Markers of this dictionary, each at an unknown place.
+    Markers(Dictionary),
+}
+
+/// Fewest markers in a picture that tell how they are laid out.
+const FEWEST: usize = 5;
+/// A layout fits if the middles of markers lie this near to where it puts them, in sides of a marker.
+const FIT: f64 = 0.12;
+
+/// Finds out what is printed in the pictures: a ChArUco board, a grid of markers, markers in no order, a chessboard;
+/// `None` where there is nothing of the kind. A few pictures are enough. Lengths of boards are in squares or markers.
+///
+/// # Errors
+/// [`CaptureError::OpenCv`] where OpenCV fails.
+pub fn recognise_pattern(images: &[Image<[u8; 3]>]) -> Result<Option<Pattern>, CaptureError> {
+    let Some(dictionary) = guess_dictionary(images)? else {
+        return Ok(chessboard(images)?.map(Pattern::Board));
+    };
+    let seen = images.iter().map(|image| {
+        let mut markers = markers_in(&grey(image), dictionary, CornerRefineMethod::CORNER_REFINE_SUBPIX)?;
+        let ids: Vec<usize> = markers.iter().map(|m| m.id).collect();
+        markers.retain(|m| ids.iter().filter(|&&id| id == m.id).count() == 1);
+        Ok(markers)
+    });
+    let mut seen = seen.collect::<Result<Vec<Vec<FoundMarker>>, CaptureError>>()?;
+    seen.retain(|markers| markers.len() >= FEWEST);
+    let Some(highest) = seen.iter().flatten().map(|m| m.id).max() else {
+        return Ok(Some(Pattern::Markers(dictionary)));
+    };
+    let board = candidates(dictionary, highest).par_bridge().filter_map(|board| Some((misfit(&board, &seen)?, board)));
+    // Ties go to the board of fewer columns, whatever thread found it.
+    let best = board.min_by(|(a, x), (b, y)| a.total_cmp(b).then(x.counts().cmp(&y.counts())));
+    let found = best.filter(|(misfit, _)| *misfit < FIT).and_then(|(_, board)| measured(&board, &seen));
+    Ok(Some(found.map_or(Pattern::Markers(dictionary), Pattern::Board)))
+}
+
+/// What an image shows of a pattern; of markers in no order, corner `4 id + k` is corner `k` of marker `id`.
+///
+/// # Errors
+/// [`CaptureError::OpenCv`] where OpenCV fails.
+pub fn detect_pattern(image: &Image<[u8; 3]>, pattern: &Pattern) -> Result<BoardView, CaptureError> {
+    match pattern {
+        Pattern::Board(board) => detect_board(image, board),
+        Pattern::Markers(dictionary) => {
+            let markers = detect_markers(image, *dictionary)?;
+            let corners = markers.iter().flat_map(|m| [0, 1, 2, 3].map(|k| (4 * m.id + k, m.corners[k]))).collect();
+            Ok(BoardView { corners, markers })
+        }
+    }
+}
+
+/// Boards with squares or pitches of 1 that have a marker of the highest id in their last row.
+fn candidates(dictionary: Dictionary, highest: usize) -> impl Iterator<Item = Board> + Send {
+    let fewest_rows = move |board: fn(usize, usize, Dictionary) -> Board, columns: usize| {
+        let rows = (1..=60).find(|&rows| board(columns, rows, dictionary).markers().len() > highest);
+        rows.map(|rows| board(columns, rows, dictionary))
+    };
+    let dark_first: fn(usize, usize, Dictionary) -> Board = |columns, rows, dictionary| Board::Charuco {
+        columns,
+        rows,
+        square: 1.0,
+        marker: 0.75,
+        dictionary,
+        light_first: false,
+    };
+    let light_first: fn(usize, usize, Dictionary) -> Board = |columns, rows, dictionary| Board::Charuco {
+        columns,
+        rows,
+        square: 1.0,
+        marker: 0.75,
+        dictionary,
+        light_first: true,
+    };
+    let grid: fn(usize, usize, Dictionary) -> Board =
+        |columns, rows, dictionary| Board::ArucoGrid { columns, rows, marker: 0.75, gap: 0.25, dictionary };
+    let boards = [dark_first, light_first, grid].into_iter();
+    boards.flat_map(move |board| (2..=40).filter_map(move |columns| fewest_rows(board, columns)))
+}
+
+/// How far the middles of markers lie from where the board would have them, in sides of a marker: the median over the
+/// pictures. Middles do not depend on how large the markers are in their squares. `None` where no picture tells.
+fn misfit(board: &Board, seen: &[Vec<FoundMarker>]) -> Option<f64> {
+    let in_picture = |markers: &Vec<FoundMarker>| {
+        let (map, pairs) = middles_map(board, markers)?;
+        let sides: f64 =
+            markers.iter().map(|m| (m.corners[0] - m.corners[1]).norm()).sum::<f64>() / markers.len() as f64;
+        let square: f64 = pairs
+            .iter()
+            .map(|(from, to)| apply(&map, from).map_or(f64::INFINITY, |mapped| (mapped - to).norm_squared()))
+            .sum();
+        Some((square / pairs.len() as f64).sqrt() / sides)
+    };
+    let mut misfits: Vec<f64> = seen.iter().filter_map(in_picture).collect();
+    misfits.sort_by(f64::total_cmp);
+    misfits.get(misfits.len() / 2).copied()
+}
+
+type Pairs = Vec<(Point2<f64>, Point2<f64>)>;
+
+/// The homography from the board to a picture by the middles of markers alone, robustly, and the pairs.
+fn middles_map(board: &Board, markers: &[FoundMarker]) -> Option<(Matrix3<f64>, Pairs)> {
+    let known = board.markers();
+    let middle = |m: &FoundMarker| {
+        let place = known.get(m.id)?;
+        Some((nalgebra::center(&place.corners[0], &place.corners[2]).xy(), middle_of(&m.corners)?))
+    };
+    let pairs: Pairs = markers.iter().filter_map(middle).collect();
+    let spans = |axis: usize| {
+        let (low, high) = pairs.iter().fold((f64::MAX, f64::MIN), |(l, h), (p, _)| (l.min(p[axis]), h.max(p[axis])));
+        high - low > 0.5
+    };
+    if pairs.len() < FEWEST || !spans(0) || !spans(1) {
+        return None;
+    }
+    let map = homography(&pairs, 0, 0.0).ok().flatten()?;
+    Some((map, pairs))
+}
+
+/// Where the diagonals meet: the picture of the middle, however the marker is tilted.
+fn middle_of(corners: &[Point2<f64>; 4]) -> Option<Point2<f64>> {
+    let diagonal = |a: usize, b: usize| corners[a].to_homogeneous().cross(&corners[b].to_homogeneous());
+    Point2::from_homogeneous(diagonal(0, 2).cross(&diagonal(1, 3)))
+}
+
+/// The board with its markers as large as they are seen; `None` where they are turned another way or are of no size
+/// that could be.
+fn measured(board: &Board, seen: &[Vec<FoundMarker>]) -> Option<Board> {
+    let mut sides = Vec::new();
+    let mut upright = 0_usize;
+    for markers in seen {
+        let Some(back) = middles_map(board, markers).and_then(|(map, _)| map.try_inverse()) else { continue };
+        for marker in markers {
+            let Some([a, b, _, d]) = all(marker.corners.map(|corner| apply(&back, &corner))) else { continue };
+            sides.push(0.5 * ((b - a).norm() + (d - a).norm()));
+            // On the board x runs right and y up: from top left to top right, and up from bottom left.
+            upright += usize::from((b - a).x > 0.0 && (a - d).y > 0.0);
+        }
+    }
+    sides.sort_by(f64::total_cmp);
+    let side = *sides.get(sides.len() / 2)?;
+    let measured = match *board {
+        Board::Charuco { columns, rows, dictionary, light_first, .. } => {
+            Board::Charuco { columns, rows, square: 1.0, marker: in_twentieths(side), dictionary, light_first }
+        }
+        Board::ArucoGrid { columns, rows, dictionary, .. } => {
+            Board::ArucoGrid { columns, rows, marker: 1.0, gap: 1.0 / side - 1.0, dictionary }
+        }
+        Board::Chessboard { .. } => return None,
+    };
+    (2 * upright > sides.len() && measured.check().is_ok()).then_some(measured)
+}
+
+/// Only where corners of squares are free of print depends on it: no need for more.
+fn in_twentieths(share: f64) -> f64 {
+    (share * 20.0).round() / 20.0
+}
+
+fn all<T: Copy>(found: [Option<T>; 4]) -> Option<[T; 4]> {
+    Some([found[0]?, found[1]?, found[2]?, found[3]?])
+}
+
+/// The chessboard most pictures show whole.
+fn chessboard(images: &[Image<[u8; 3]>]) -> Result<Option<Board>, CaptureError> {
+    let counts: Vec<Option<[usize; 2]>> =
+        images.iter().map(|image| Ok(chessboard_counts(&grey(image))?)).collect::<Result<_, CaptureError>>()?;
+    let mut counts: Vec<[usize; 2]> = counts.into_iter().flatten().map(|[a, b]| [a.max(b), a.min(b)]).collect();
+    counts.sort_unstable();
+    let most = counts.chunk_by(|a, b| a == b).max_by_key(|same| same.len());
+    Ok(most.map(|same| Board::Chessboard { columns: same[0][0] + 1, rows: same[0][1] + 1, square: 1.0 }))
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,69 @@
+use super::*;
+use crate::video::detect::tests::{camera, photograph};
+
+const VIEWS: [(f64, f64); 3] = [(0.2, 0.3), (-0.5, 1.0), (0.6, 2.6)];
+
+fn pictures(board: &Board) -> Vec<Image<[u8; 3]>> {
+    let [width, height] = board.size();
+    let view = |&(tilt, roll): &(f64, f64)| {
+        let mut seen = camera(tilt, roll, 0.0);
+        // So far away that it is seen whole, and in the middle.
+        let centre = nalgebra::Vector3::new(0.5 * width, 0.5 * height, 0.0);
+        seen.translation = nalgebra::Vector3::new(0.0, 0.0, 2.4 * width.max(height)) - seen.rotation * centre;
+        photograph(board, &seen)
+    };
+    VIEWS.iter().map(view).collect()
+}
+
+/// The same board with squares (or markers) of one.
+fn in_squares(board: &Board) -> Board {
+    let mut board = *board;
+    match &mut board {
+        Board::Chessboard { square, .. } => *square = 1.0,
+        Board::Charuco { square, marker, .. } => (*square, *marker) = (1.0, *marker / *square),
+        Board::ArucoGrid { marker, gap, .. } => (*marker, *gap) = (1.0, *gap / *marker),
+    }
+    board
+}
+
+#[test]
+fn every_kind_of_board_is_found_out_by_looking_at_it() {
+    for text in [
+        "charuco:7x5:30mm:22.5mm:4x4_50",
+        "charuco:6x8:20mm:14mm:5x5_50:light-first",
+        "charuco:7x7:20mm:15mm:4x4_50",
+        "aruco:5x4:30mm:8mm:6x6_50",
+        "chessboard:10x7:25mm",
+        "chessboard:8x8:25mm",
+    ] {
+        let board: Board = text.parse().unwrap();
+        let Some(Pattern::Board(found)) = recognise_pattern(&pictures(&board)).unwrap() else { panic!("{text}") };
+        let expected = in_squares(&board);
+        match (found, expected) {
+            (Board::ArucoGrid { gap, .. }, Board::ArucoGrid { gap: true_gap, .. }) => {
+                assert!((gap - true_gap).abs() < 0.01, "{gap} for {true_gap}");
+                assert_eq!(found.counts(), expected.counts());
+            }
+            _ => assert_eq!(found, expected, "{text}"),
+        }
+    }
+}
+
+#[test]
+fn markers_in_no_order_are_left_in_none() {
+    // Of a grid each picture shows every other marker moved: no board fits.
+    let board: Board = "aruco:5x4:30mm:8mm:6x6_50".parse().unwrap();
+    let dictionary = board.dictionary().unwrap();
+    let mut seen: Vec<FoundMarker> = detect_markers(&pictures(&board)[0], dictionary).unwrap();
+    seen.iter_mut().for_each(|marker| marker.id = (marker.id * 7) % 20);
+    let fits = candidates(dictionary, 19).filter(|b| misfit(b, std::slice::from_ref(&seen)).is_some_and(|m| m < FIT));
+    assert_eq!(fits.count(), 0);
+}
+
+#[test]
+fn where_no_pattern_is_none_is_found() {
+    let plain = vec![Image::filled(320, 240, [90, 120, 80]); 2];
+    assert_eq!(recognise_pattern(&plain).unwrap(), None);
+    assert_eq!(recognise_pattern(&[]).unwrap(), None);
+    assert_eq!(recognise_pattern(&[Image::filled(3, 3, [0; 3])]).unwrap(), None);
+}
