@@ -14,6 +14,7 @@
 //! ```
 
 pub mod board;
+pub mod calibrate;
 mod camera;
 mod capture_set;
 pub mod contour;
