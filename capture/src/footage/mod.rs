@@ -92,6 +92,15 @@ impl Footage {
         }
     }
 
+    /// Where the photographs come from, in order; films are known only when they are read.
+    pub fn photographs(&self) -> Vec<FrameSource> {
+        let of_take = |(take, files): (usize, &Take)| match files {
+            Take::Stills(files) => files.iter().enumerate().map(|(i, file)| source_of(take, i, file)).collect(),
+            Take::Film(_) => Vec::new(),
+        };
+        self.takes.iter().enumerate().flat_map(of_take).collect()
+    }
+
     /// Whether there is a film in it.
     pub fn has_film(&self) -> bool {
         self.takes.iter().any(|take| matches!(take, Take::Film(_)))
@@ -194,10 +203,12 @@ impl Iterator for Frames<'_> {
 }
 
 fn photograph(take: usize, index: usize, file: &Path) -> Result<FootageFrame, CaptureError> {
-    let image = read_upright(file)?;
+    Ok(FootageFrame { image: read_upright(file)?, source: source_of(take, index, file) })
+}
+
+fn source_of(take: usize, index: usize, file: &Path) -> FrameSource {
     let name = file.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
-    let source = FrameSource { take, index, time_s: index as f64, name, file: Some(file.to_owned()) };
-    Ok(FootageFrame { source, image })
+    FrameSource { take, index, time_s: index as f64, name, file: Some(file.to_owned()) }
 }
 
 #[cfg(test)]

@@ -4,12 +4,14 @@
 //! and nowhere else.
 
 mod detect;
+mod observe;
 mod orientation;
 mod read;
 mod recognise;
 mod write;
 
 pub use detect::{BoardView, FoundMarker, detect_board, detect_markers, guess_dictionary};
+pub use observe::{Observations, Observed, observe, recognise_in_footage};
 pub use read::{FilmFrame, FilmInfo, FilmReader, ReadOptions};
 pub use recognise::{Pattern, detect_pattern, recognise_pattern};
 pub use write::{Codec, FilmWriter, WriteOptions, Written};

@@ -1,0 +1,255 @@
+//! Cameras from a board in the footage.
+
+use super::{FootageOptions, Shot, Shots};
+use crate::Error;
+use crate::stages::Stages;
+use capture::calibrate::{
+    CalibrateOptions, Calibration, FramePose, LensKnowledge, Motion, MotionKind, Sighting, Standing, Target, Turntable,
+    calibrate,
+};
+use capture::choose::PoseSource;
+use capture::footage::Footage;
+use capture::video::{Observations, Observed, Pattern, observe, recognise_in_footage};
+use capture::{Board, Intrinsics};
+
+/// Corners that tell a camera: a homography needs four, and two more show that it is right.
+const FEWEST_CORNERS: usize = 6;
+
+pub(super) fn find_cameras(
+    footage: &Footage,
+    options: &FootageOptions,
+    stages: &mut Stages<'_>,
+) -> Result<Shots, Error> {
+    let (pattern, is_measured) = find_pattern(footage, options, stages)?;
+    let seen = look(footage, &pattern, "look", stages)?;
+    let sightings = sightings(&seen);
+    if sightings.len() < 2 {
+        return Err(too_few(footage, &pattern, &sightings, &seen));
+    }
+    let lens = lens(options, &pattern, seen.size, stages)?;
+    let calibrate_options = CalibrateOptions {
+        lens,
+        motion: options.motion,
+        upside_down: looks_the_same_upside_down(&pattern),
+        ..CalibrateOptions::new(seen.size)
+    };
+    let found = stages.run("calibrate", |_| calibrate(&target(&pattern, options), &sightings, &calibrate_options));
+    let calibration =
+        found.map_err(|fault| Error::Failed(format!("{}: {fault}", footage.path().display())))?;
+    let mut findings = calibration.findings.clone();
+    findings.extend(seen.fault.as_ref().map(|fault| format!("the footage is used as far as it goes: {fault}")));
+    let shots = shots(&seen, &calibration);
+    let told_by = format!("{} in {} of {} frames", described(&pattern, is_measured), sightings.len(), shots.len());
+    Ok(Shots {
+        shots,
+        size: seen.size,
+        board: match pattern {
+            Pattern::Board(board) => Some(board),
+            Pattern::Markers(_) => None,
+        },
+        calibration: Some(calibration),
+        told_by,
+        unit: is_measured.then_some(1.0),
+        has_plane: true,
+        findings,
+    })
+}
+
+/// What is printed, and whether its lengths are metres.
+fn find_pattern(
+    footage: &Footage,
+    options: &FootageOptions,
+    stages: &mut Stages<'_>,
+) -> Result<(Pattern, bool), Error> {
+    if let Some(board) = options.board {
+        return Ok((Pattern::Board(board), true));
+    }
+    let found = stages.run("recognise board", |_| recognise_in_footage(footage))?;
+    let pattern = found.ok_or_else(|| no_board(footage))?;
+    let pattern = sized(pattern, options.length.unwrap_or(1.0));
+    stages.observer().noted(&described(&pattern, options.length.is_some()));
+    Ok((pattern, options.length.is_some()))
+}
+
+fn no_board(footage: &Footage) -> Error {
+    Error::Failed(format!(
+        "{}: shows no calibration board; print one (`turnlight board -o board.pdf`), put it under the object and film \
+         again, or give cameras (--cameras, --colmap)",
+        footage.path().display()
+    ))
+}
+
+/// A board of unit squares (of unit markers), with squares of this many metres.
+fn sized(pattern: Pattern, length: f64) -> Pattern {
+    let Pattern::Board(mut board) = pattern else { return pattern };
+    match &mut board {
+        Board::Chessboard { square, .. } => *square *= length,
+        Board::Charuco { square, marker, .. } => (*square, *marker) = (*square * length, *marker * length),
+        Board::ArucoGrid { marker, gap, .. } => (*marker, *gap) = (*marker * length, *gap * length),
+    }
+    Pattern::Board(board)
+}
+
+fn described(pattern: &Pattern, is_measured: bool) -> String {
+    match pattern {
+        Pattern::Board(board) if is_measured => board.to_string(),
+        Pattern::Board(board) => {
+            let [columns, rows] = board.counts();
+            let dictionary = board.dictionary().map(|d| format!(", {d}")).unwrap_or_default();
+            let kind = match board {
+                Board::Chessboard { .. } => "chessboard",
+                Board::Charuco { .. } => "ChArUco board",
+                Board::ArucoGrid { .. } => "grid of markers",
+            };
+            format!("{kind} of {columns} × {rows}{dictionary}, of unknown size")
+        }
+        Pattern::Markers(dictionary) => format!("markers in no order, {dictionary}"),
+    }
+}
+
+fn look(footage: &Footage, pattern: &Pattern, stage: &str, stages: &mut Stages<'_>) -> Result<Observations, Error> {
+    // How many frames a film has is known when it has been read.
+    Ok(stages.run(stage, |observer| observe(footage, Some(pattern), &mut |seen| observer.advanced(seen, 0)))?)
+}
+
+fn sightings(seen: &Observations) -> Vec<Sighting> {
+    let told = seen.frames.iter().enumerate().filter(|(_, frame)| frame.view.corners.len() >= FEWEST_CORNERS);
+    told.map(|(at, frame)| Sighting {
+        frame: at,
+        time_s: frame.source.time_s,
+        corners: frame.view.corners.clone(),
+        film: frame.source.take,
+    })
+    .collect()
+}
+
+fn too_few(footage: &Footage, pattern: &Pattern, sightings: &[Sighting], seen: &Observations) -> Error {
+    let (found, of) = (sightings.len(), seen.frames.len());
+    let name = match pattern {
+        Pattern::Board(board) => board.to_string(),
+        Pattern::Markers(dictionary) => format!("markers of {dictionary}"),
+    };
+    Error::Failed(format!(
+        "{}: {name} is seen in {found} of {of} frames; check that this is the board in the footage (leave --board away \
+         to have it found out), light it evenly, and film so that it stays in view",
+        footage.path().display()
+    ))
+}
+
+/// What is known of the lens: from calibration shots, if there are any.
+fn lens(
+    options: &FootageOptions,
+    pattern: &Pattern,
+    size: [usize; 2],
+    stages: &mut Stages<'_>,
+) -> Result<LensKnowledge, Error> {
+    let Some(shots) = &options.calibration else { return Ok(LensKnowledge::Unknown) };
+    let found = stages.run("recognise calibration board", |_| recognise_in_footage(shots))?;
+    let pattern = match found {
+        Some(found) => sized(found, options.length.unwrap_or(1.0)),
+        None => *pattern,
+    };
+    let seen = look(shots, &pattern, "look at calibration shots", stages)?;
+    if seen.size != size {
+        let [[a, b], [c, d]] = [seen.size, size];
+        let fault = format!("{}: is {a}x{b}, the footage is {c}x{d}", shots.path().display());
+        return Err(Error::Failed(format!("{fault}; calibrate with the same camera, size and zoom")));
+    }
+    let calibrate_options = CalibrateOptions {
+        motion: Some(MotionKind::FreeHand),
+        upside_down: looks_the_same_upside_down(&pattern),
+        ..CalibrateOptions::new(size)
+    };
+    let sightings = sightings(&seen);
+    let found = stages.run("calibrate lens", |_| calibrate(&target(&pattern, options), &sightings, &calibrate_options));
+    let calibration = found.map_err(|fault| Error::Failed(format!("{}: {fault}", shots.path().display())))?;
+    stages.observer().noted(&lens_note(&calibration.intrinsics, calibration.rms_px));
+    calibration.findings.iter().for_each(|finding| stages.observer().noted(finding));
+    Ok(LensKnowledge::Known(calibration.intrinsics))
+}
+
+fn lens_note(lens: &Intrinsics, rms_px: f64) -> String {
+    format!("lens: f {:.1} px, centre ({:.1}, {:.1}), {rms_px:.2} px RMS", lens.fx, lens.cx, lens.cy)
+}
+
+fn target(pattern: &Pattern, options: &FootageOptions) -> Target {
+    match pattern {
+        Pattern::Board(board) => Target::Points(board.corners()),
+        Pattern::Markers(_) => Target::Markers { side: options.length.unwrap_or(1.0) },
+    }
+}
+
+/// A chessboard whose counts are both even or both odd shows the same squares when turned half around.
+fn looks_the_same_upside_down(pattern: &Pattern) -> bool {
+    matches!(pattern, Pattern::Board(Board::Chessboard { columns, rows, .. }) if (columns + rows) % 2 == 0)
+}
+
+/// Every frame with its camera: by its own corners, or from the motion between those that have some.
+fn shots(seen: &Observations, calibration: &Calibration) -> Vec<Shot> {
+    let turntable = match &calibration.motion {
+        Motion::Turntable(turntable) => Some(turntable),
+        Motion::FreeHand => None,
+    };
+    let mut poses = calibration.frames.iter().enumerate().peekable();
+    let shot = |(at, frame): (usize, &Observed)| match poses.next_if(|(_, pose)| pose.frame == at) {
+        Some((sighting, pose)) => sighted(frame, sighting, pose, turntable),
+        None => unsighted(frame, calibration, turntable),
+    };
+    seen.frames.iter().enumerate().map(shot).collect()
+}
+
+fn bare(frame: &Observed) -> Shot {
+    Shot {
+        source: frame.source.clone(),
+        sharpness: frame.sharpness,
+        motion: frame.motion,
+        camera: None,
+        pose: PoseSource::Missing,
+        angle: None,
+        standpoint: None,
+        corners: 0,
+        rms_px: 0.0,
+        fault: None,
+    }
+}
+
+fn sighted(frame: &Observed, sighting: usize, pose: &FramePose, turntable: Option<&Turntable>) -> Shot {
+    let fault = match &pose.standing {
+        Standing::Used => None,
+        Standing::Rejected(why) => Some(why.clone()),
+    };
+    let source = match (pose.camera, &fault, pose.filled_deviation) {
+        (None, ..) => PoseSource::Missing,
+        (Some(_), _, Some(_)) => PoseSource::Filled,
+        (Some(_), Some(_), None) => PoseSource::Rejected,
+        (Some(_), None, None) => PoseSource::Measured,
+    };
+    let segments = turntable.map(|t| &t.segments[..]).unwrap_or_default();
+    Shot {
+        camera: pose.camera,
+        pose: source,
+        angle: turntable.and_then(|t| t.angles.get(sighting).copied().flatten()),
+        standpoint: segments.iter().position(|s| (s.first..=s.last).contains(&sighting)),
+        corners: pose.used.len(),
+        rms_px: pose.rms_px,
+        fault,
+        ..bare(frame)
+    }
+}
+
+fn unsighted(frame: &Observed, calibration: &Calibration, turntable: Option<&Turntable>) -> Shot {
+    let Some(filled) = calibration.camera_at(frame.source.take, frame.source.time_s) else {
+        return Shot { fault: Some("the board is not seen".to_owned()), ..bare(frame) };
+    };
+    let stands = |segment: &capture::calibrate::Segment| {
+        let times = [segment.first, segment.last].map(|at| calibration.frames[at].time_s);
+        segment.film == frame.source.take && (times[0]..=times[1]).contains(&frame.source.time_s)
+    };
+    Shot {
+        camera: Some(filled.camera),
+        pose: PoseSource::Filled,
+        angle: Some(filled.angle),
+        standpoint: turntable.and_then(|t| t.segments.iter().position(stands)),
+        ..bare(frame)
+    }
+}

@@ -1,0 +1,108 @@
+//! Where the cameras of footage come from: a board in it, or elsewhere.
+
+use super::{FootageOptions, Shot, Shots};
+use crate::Error;
+use crate::stages::Stages;
+use capture::choose::{self, PoseSource};
+use capture::footage::{Footage, FrameSource};
+use capture::{Camera, Capture};
+use rayon::prelude::*;
+use std::path::{Path, PathBuf};
+
+/// Where the cameras come from.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub enum CameraSource {
+    /// A board in the footage.
+    #[default]
+    Board,
+    /// A calibrated folder of any known kind, whose frames have the names of the photographs.
+    Calibrated(PathBuf),
+}
+
+/// Finds the frames of the footage and their cameras.
+///
+/// # Errors
+/// Where the footage cannot be read, shows no board, or its cameras cannot be told.
+pub(super) fn find_cameras(
+    footage: &Footage,
+    options: &FootageOptions,
+    stages: &mut Stages<'_>,
+) -> Result<Shots, Error> {
+    match &options.cameras {
+        CameraSource::Board => by_board(footage, options, stages),
+        CameraSource::Calibrated(path) => calibrated(footage, path, stages),
+    }
+}
+
+#[cfg(feature = "video")]
+use super::by_board::find_cameras as by_board;
+
+/// Boards are found by OpenCV.
+#[cfg(not(feature = "video"))]
+fn by_board(footage: &Footage, _: &FootageOptions, _: &mut Stages<'_>) -> Result<Shots, Error> {
+    Err(Error::Failed(format!(
+        "{}: this turnlight was built without films and boards; give the cameras of photographs with --cameras, or \
+         install libopencv-dev, clang and libclang-dev and build with --features video",
+        footage.path().display()
+    )))
+}
+
+/// Photographs whose cameras were told elsewhere.
+fn calibrated(footage: &Footage, path: &Path, stages: &mut Stages<'_>) -> Result<Shots, Error> {
+    let capture = Capture::read(path)?;
+    let sources = photographs(footage)?;
+    let cameras = sources.iter().map(|source| camera_of(source, &capture, path)).collect::<Result<Vec<_>, _>>()?;
+    let sharpness = stages.run("look", |_| {
+        let look = |source: &FrameSource| match &source.file {
+            Some(file) => Ok(choose::sharpness(&capture::footage::read_upright(file)?)),
+            None => Ok(0.0),
+        };
+        sources.par_iter().map(look).collect::<Vec<Result<f64, Error>>>()
+    });
+    let mut shots = Vec::new();
+    for ((source, camera), sharpness) in sources.into_iter().zip(&cameras).zip(sharpness) {
+        shots.push(Shot {
+            source,
+            sharpness: sharpness?,
+            motion: 0.0,
+            camera: Some(*camera),
+            pose: PoseSource::Measured,
+            angle: None,
+            standpoint: None,
+            corners: 0,
+            rms_px: 0.0,
+            fault: None,
+        });
+    }
+    let size = cameras.first().map_or([0, 0], |c| [c.intrinsics.width, c.intrinsics.height]);
+    Ok(Shots {
+        shots,
+        size,
+        calibration: None,
+        board: None,
+        told_by: format!("cameras of {}", path.display()),
+        unit: capture.unit,
+        has_plane: false,
+        findings: Vec::new(),
+    })
+}
+
+/// The frames of footage that is photographs alone.
+fn photographs(footage: &Footage) -> Result<Vec<FrameSource>, Error> {
+    if footage.has_film() {
+        let fault = "cameras from elsewhere are given by the names of photographs, and this is a film";
+        return Err(Error::Arguments(format!("{}: {fault}; give its frames as a folder", footage.path().display())));
+    }
+    Ok(footage.photographs())
+}
+
+/// The camera of the frame of the same name.
+fn camera_of(source: &FrameSource, capture: &Capture, path: &Path) -> Result<Camera, Error> {
+    let stem = |path: &Path| path.file_stem().map(|s| s.to_string_lossy().to_lowercase());
+    let wanted = source.file.as_deref().and_then(stem);
+    let found = capture.frames.iter().find(|frame| stem(&frame.image_path) == wanted);
+    found.map(|frame| frame.camera).ok_or_else(|| {
+        let fault = format!("{}: {} has no camera of this name", source.name, path.display());
+        Error::Failed(format!("{fault}; leave the photograph out, or add its camera"))
+    })
+}

@@ -1,0 +1,74 @@
+//! Which frames of the footage become the capture.
+
+use super::{FootageOptions, Shots};
+use capture::choose::{Choice, ChooseOptions, FilmFrame, Viewpoint, choose_frames};
+
+/// Standpoints whose heights above the table differ by less see the same ring, radians.
+const SAME_HEIGHT: f64 = 0.06;
+
+/// Chooses frames for every height of the camera, and puts the choices together.
+pub(super) fn select(shots: &Shots, options: &FootageOptions) -> Vec<(Vec<usize>, Choice)> {
+    let groups = heights(shots);
+    let usual = ChooseOptions::default();
+    let most = (options.most.unwrap_or(usual.most * groups.len()) / groups.len()).max(1);
+    let choose = |members: &Vec<usize>| {
+        let frames: Vec<FilmFrame> = members.iter().map(|&at| film_frame(shots, at)).collect();
+        (members.clone(), choose_frames(&frames, &ChooseOptions { most, ..usual }))
+    };
+    groups.iter().map(choose).collect()
+}
+
+fn film_frame(shots: &Shots, at: usize) -> FilmFrame {
+    let shot = &shots.shots[at];
+    FilmFrame {
+        time_s: shot.source.time_s,
+        sharpness: shot.sharpness,
+        blur_px: None,
+        viewpoint: viewpoint(shots, at),
+        pose: shot.pose,
+        motion: shot.motion,
+    }
+}
+
+/// On a turntable the azimuth of the camera about the axis, unwrapped; otherwise its direction from the origin.
+fn viewpoint(shots: &Shots, at: usize) -> Option<Viewpoint> {
+    let shot = &shots.shots[at];
+    let camera = shot.camera?;
+    let standpoint = shot.standpoint.and_then(|at| shots.standpoints().get(at));
+    match (shot.angle, standpoint) {
+        (Some(angle), Some(standpoint)) => {
+            // The camera goes round the object the other way.
+            let start = standpoint.pose.inverse().translation.vector;
+            Some(Viewpoint::Angle(start.y.atan2(start.x) - angle))
+        }
+        _ => Some(Viewpoint::Direction(camera.center().coords)),
+    }
+}
+
+/// Positions of frames by the camera's height above the table; one group where nothing turns.
+fn heights(shots: &Shots) -> Vec<Vec<usize>> {
+    let mut groups: Vec<(f64, Vec<usize>)> = Vec::new();
+    let mut without = Vec::new();
+    for (at, shot) in shots.shots.iter().enumerate() {
+        let centre = shot.camera.filter(|_| shot.angle.is_some()).map(|camera| camera.center());
+        let Some(centre) = centre else {
+            without.push(at);
+            continue;
+        };
+        let height = centre.z.atan2(centre.x.hypot(centre.y));
+        match groups.iter_mut().find(|(known, _)| (known - height).abs() < SAME_HEIGHT) {
+            Some((_, members)) => members.push(at),
+            None => groups.push((height, vec![at])),
+        }
+    }
+    let mut groups: Vec<Vec<usize>> = groups.into_iter().map(|(_, members)| members).collect();
+    // Frames without a camera are dropped by whatever group they are in.
+    match groups.first_mut() {
+        Some(first) => {
+            first.extend(without);
+            first.sort_unstable();
+        }
+        None => groups.push(without),
+    }
+    groups
+}

@@ -1,0 +1,72 @@
+//! Every frame of the footage, with what is known of it.
+
+use capture::calibrate::{Calibration, Motion, Segment, Turntable};
+use capture::choose::PoseSource;
+use capture::footage::FrameSource;
+use capture::{Board, Camera};
+
+/// One frame of the footage.
+#[derive(Clone, Debug)]
+pub struct Shot {
+    /// Where it comes from.
+    pub source: FrameSource,
+    /// As [`capture::choose::sharpness`] says; 0 where it was not looked at.
+    pub sharpness: f64,
+    /// How far the picture moved since the frame before.
+    pub motion: f64,
+    /// World to pixels, where known.
+    pub camera: Option<Camera>,
+    /// How it is known.
+    pub pose: PoseSource,
+    /// Turn of the table in radians, unwrapped.
+    pub angle: Option<f64>,
+    /// For how long the camera stood where it did in this frame: position among the standpoints; `None` in hand.
+    pub standpoint: Option<usize>,
+    /// Corners of the board that were used.
+    pub corners: usize,
+    /// Distance of these corners from where the camera puts them, root of the mean square; 0 without any.
+    pub rms_px: f64,
+    /// Why the frame cannot be used, in words.
+    pub fault: Option<String>,
+}
+
+/// The frames of the footage, and what is known of all of them.
+#[derive(Clone, Debug)]
+pub struct Shots {
+    /// In the order of the footage.
+    pub shots: Vec<Shot>,
+    /// Width and height in pixels.
+    pub size: [usize; 2],
+    /// What the board told, if there was one.
+    pub calibration: Option<Calibration>,
+    /// The board, as it was recognised or given.
+    pub board: Option<Board>,
+    /// What told the cameras, in words.
+    pub told_by: String,
+    /// Metres per world unit, where known.
+    pub unit: Option<f64>,
+    /// Whether the object stands on something flat in the world's plane z = 0, and reaches up from it.
+    pub has_plane: bool,
+    /// What the user should know.
+    pub findings: Vec<String>,
+}
+
+impl Shots {
+    /// The turntable, if it was one.
+    pub fn turntable(&self) -> Option<&Turntable> {
+        match &self.calibration.as_ref()?.motion {
+            Motion::Turntable(turntable) => Some(turntable),
+            Motion::FreeHand => None,
+        }
+    }
+
+    /// Where the camera stood while the table turned, one after the other.
+    pub fn standpoints(&self) -> &[Segment] {
+        self.turntable().map(|t| &t.segments[..]).unwrap_or_default()
+    }
+
+    /// Frames with a camera of their own or from the motion.
+    pub fn posed(&self) -> usize {
+        self.shots.iter().filter(|shot| matches!(shot.pose, PoseSource::Measured | PoseSource::Filled)).count()
+    }
+}
