@@ -39,6 +39,14 @@ pub enum CaptureError {
         /// The factor asked for.
         downscale: usize,
     },
+    /// What is said of the footage contradicts itself.
+    #[error("footage: {fault}; {remedy}")]
+    Stage {
+        /// What is wrong.
+        fault: String,
+        /// What to do.
+        remedy: String,
+    },
     /// OpenCV could not work on an image in memory.
     #[cfg(feature = "video")]
     #[error("OpenCV failed ({}); report this as a bug", .0.message.trim())]

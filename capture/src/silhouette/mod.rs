@@ -1,0 +1,10 @@
+//! Silhouettes found where none are given: in photographs before a plain backdrop ([`find_mattes`]), and in
+//! footage of an object that stands on a flat target ([`find_silhouettes`]).
+
+mod footage;
+mod photographs;
+
+pub use footage::{
+    Evidence, FetchFrame, SilhouetteOptions, Silhouettes, StageSetup, check_silhouettes, find_silhouettes,
+};
+pub use photographs::{find_mattes, find_mattes_in_box};
