@@ -16,11 +16,13 @@
 pub mod board;
 mod camera;
 mod capture_set;
+pub mod choose;
 pub mod contour;
 pub mod doctor;
 mod error;
 mod formats;
 mod image;
+pub mod light;
 mod load;
 mod masks;
 mod matte;
