@@ -3,6 +3,7 @@
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
 use turnlight::Selection;
+use turnlight::capture::Board;
 use turnlight::capture::board::{Dictionary, Paper, parse_length};
 
 /// What this build can and cannot do.
@@ -47,6 +48,8 @@ pub(crate) enum Command {
     /// Bidirectional texture functions: materials under all views and lights
     #[command(subcommand)]
     Btf(BtfCommand),
+    /// Make a capture of a film or of photographs: frames, cameras, silhouettes, report
+    Capture(CaptureFootageArgs),
     /// Compare the four methods on held-out views: table, plot, crops
     Compare(CompareArgs),
     /// Film a synthetic object, model it, compare the methods
@@ -180,6 +183,51 @@ pub(crate) struct BoardArgs {
     /// Resolution of a .png
     #[arg(long, value_name = "N", default_value = "300", value_parser = dpi)]
     pub(crate) dpi: f64,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct CaptureFootageArgs {
+    /// Films (.mp4 .mov .avi .mkv where built with films), folders of photographs, or photographs; each film and
+    /// folder may be taken from another height, with the same zoom
+    #[arg(required = true)]
+    pub(crate) footage: Vec<PathBuf>,
+    /// The capture to write
+    #[arg(short, long, value_name = "CAPTURE")]
+    pub(crate) output: PathBuf,
+    /// The board under the object, as its caption says: charuco:7x5:30mm:22.5mm:4x4_50 [default: found by looking]
+    #[arg(long, value_name = "BOARD", conflicts_with = "cameras")]
+    pub(crate) board: Option<Board>,
+    /// Side of the board's squares (of its markers, where it has no squares) if it is found by looking, as in 30mm;
+    /// gives the capture its scale
+    #[arg(long, value_name = "LENGTH", value_parser = length, conflicts_with_all = ["board", "cameras"])]
+    pub(crate) square: Option<f64>,
+    /// Film or folder of photographs of a board waved before the same camera at the same zoom, for the lens
+    #[arg(long, value_name = "FOOTAGE", conflicts_with = "cameras")]
+    pub(crate) calibration: Option<PathBuf>,
+    /// What moved [default: found out]
+    #[arg(long, value_enum, conflicts_with = "cameras")]
+    pub(crate) motion: Option<MotionArg>,
+    /// Take the cameras of photographs from this calibrated folder of any known kind, by name
+    #[arg(long, value_name = "CAPTURE")]
+    pub(crate) cameras: Option<PathBuf>,
+    /// Take silhouettes from this folder: NAME.png of a photograph, the frame's number of a film
+    #[arg(long, value_name = "DIR", conflicts_with = "clean_plate")]
+    pub(crate) masks: Option<PathBuf>,
+    /// Picture of the set without object and table, one for every film or folder
+    #[arg(long, value_name = "IMAGE")]
+    pub(crate) clean_plate: Vec<PathBuf>,
+    /// Frames to keep at most [default: 72 a turn]
+    #[arg(long, value_name = "N", value_parser = frames)]
+    pub(crate) frames: Option<usize>,
+}
+
+/// What moves while it is filmed.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(crate) enum MotionArg {
+    /// The object turns, the camera stands still
+    Turntable,
+    /// The camera is carried, the object stands still
+    FreeHand,
 }
 
 #[derive(Debug, Args)]

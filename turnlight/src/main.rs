@@ -54,6 +54,7 @@ fn run(cli: &Cli) -> Result<(), Error> {
     let answer = match &cli.command {
         Command::Board(args) => commands::board::run(args),
         Command::Btf(command) => commands::btf::run(command, &progress),
+        Command::Capture(args) => commands::capture::run(args, &progress),
         Command::Compare(args) => commands::compare::run(args, &progress),
         Command::Demo(args) => commands::demo::run(args, &progress),
         Command::Hull(args) => commands::hull::run(args, &progress),

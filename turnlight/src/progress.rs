@@ -49,6 +49,10 @@ fn steps() -> ProgressStyle {
     style.unwrap_or_else(|_| ProgressStyle::default_bar())
 }
 
+fn counter() -> ProgressStyle {
+    ProgressStyle::with_template("{spinner} {msg} {pos} {elapsed}").unwrap_or_else(|_| ProgressStyle::default_spinner())
+}
+
 impl Observer for Progress {
     fn began(&self, stage: &str) {
         if let Some(bar) = &self.bar {
@@ -61,8 +65,13 @@ impl Observer for Progress {
 
     fn advanced(&self, done: usize, total: usize) {
         if let Some(bar) = &self.bar {
-            bar.set_style(steps());
-            bar.set_length(total as u64);
+            // Films do not say how long they are.
+            if total > 0 {
+                bar.set_style(steps());
+                bar.set_length(total as u64);
+            } else {
+                bar.set_style(counter());
+            }
             bar.set_position(done as u64);
         }
     }

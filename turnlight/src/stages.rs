@@ -18,7 +18,7 @@ pub struct Stage {
 pub trait Observer {
     /// A stage begins.
     fn began(&self, stage: &str);
-    /// A stage has done `done` of `total` steps.
+    /// A stage has done `done` of `total` steps; 0 where nobody knows how many there are.
     fn advanced(&self, done: usize, total: usize);
     /// A stage ended.
     fn ended(&self, stage: &Stage);

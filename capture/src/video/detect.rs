@@ -47,8 +47,8 @@ pub fn detect_markers(image: &Image<[u8; 3]>, dictionary: Dictionary) -> Result<
     Ok(markers_in(&grey(image), dictionary, aruco::CornerRefineMethod::CORNER_REFINE_SUBPIX)?)
 }
 
-/// The smallest dictionary that has every marker seen in the images, of the family of which most are seen; `None`
-/// where none is seen.
+/// The smallest dictionary that has the markers seen in the images, of the family of which most are seen; `None`
+/// where none is seen. A marker seen in few of the images only is a speck misread.
 ///
 /// # Errors
 /// [`CaptureError::OpenCv`] where OpenCV fails.
@@ -63,12 +63,22 @@ pub fn guess_dictionary(images: &[Image<[u8; 3]>]) -> Result<Option<Dictionary>,
             let found = markers_in(grey, largest, aruco::CornerRefineMethod::CORNER_REFINE_NONE)?;
             ids.extend(found.iter().map(|marker| marker.id));
         }
-        let enough = family.iter().find(|d| ids.iter().all(|&id| id < d.len())).copied();
+        let highest = often_seen(&ids).into_iter().max();
+        let enough = family.iter().find(|d| highest.is_some_and(|id| id < d.len())).copied();
         if ids.len() > best.0 {
             best = (ids.len(), enough);
         }
     }
     Ok(best.1)
+}
+
+/// The ids that occur at least a fifth as often as the most frequent one.
+pub(super) fn often_seen(ids: &[usize]) -> Vec<usize> {
+    let mut sorted = ids.to_vec();
+    sorted.sort_unstable();
+    let runs: Vec<&[usize]> = sorted.chunk_by(|a, b| a == b).collect();
+    let most = runs.iter().map(|run| run.len()).max().unwrap_or(0);
+    runs.iter().filter(|run| 5 * run.len() >= most).map(|run| run[0]).collect()
 }
 
 /// Finds the corners of a board. Of ChArUco boards and grids of markers a part is enough; a chessboard must be seen

@@ -1,6 +1,6 @@
 //! Finds out what kind of board is in the pictures, by trying.
 
-use super::detect::{apply, chessboard_counts, grey, guess_dictionary, homography, markers_in};
+use super::detect::{apply, chessboard_counts, grey, guess_dictionary, homography, markers_in, often_seen};
 use super::{BoardView, FoundMarker, detect_board, detect_markers};
 use crate::board::{Board, Dictionary};
 use crate::{CaptureError, Image};
@@ -38,8 +38,10 @@ pub fn recognise_pattern(images: &[Image<[u8; 3]>]) -> Result<Option<Pattern>, C
         Ok(markers)
     });
     let mut seen = seen.collect::<Result<Vec<Vec<FoundMarker>>, CaptureError>>()?;
+    let known = often_seen(&seen.iter().flatten().map(|m| m.id).collect::<Vec<_>>());
+    seen.iter_mut().for_each(|markers| markers.retain(|m| known.contains(&m.id)));
     seen.retain(|markers| markers.len() >= FEWEST);
-    let Some(highest) = seen.iter().flatten().map(|m| m.id).max() else {
+    let Some(&highest) = known.last().filter(|_| !seen.is_empty()) else {
         return Ok(Some(Pattern::Markers(dictionary)));
     };
     let board = candidates(dictionary, highest).par_bridge().filter_map(|board| Some((misfit(&board, &seen)?, board)));

@@ -2,6 +2,7 @@
 
 pub(crate) mod board;
 pub(crate) mod btf;
+pub(crate) mod capture;
 pub(crate) mod compare;
 pub(crate) mod demo;
 pub(crate) mod hull;

@@ -34,8 +34,7 @@ pub(super) fn find_cameras(
         ..CalibrateOptions::new(seen.size)
     };
     let found = stages.run("calibrate", |_| calibrate(&target(&pattern, options), &sightings, &calibrate_options));
-    let calibration =
-        found.map_err(|fault| Error::Failed(format!("{}: {fault}", footage.path().display())))?;
+    let calibration = found.map_err(|fault| Error::Failed(format!("{}: {fault}", footage.path().display())))?;
     let mut findings = calibration.findings.clone();
     findings.extend(seen.fault.as_ref().map(|fault| format!("the footage is used as far as it goes: {fault}")));
     let shots = shots(&seen, &calibration);

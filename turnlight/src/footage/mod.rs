@@ -8,21 +8,24 @@
 //!
 //! Chosen frames lie on disk while this goes on: memory does not grow with the length of a film.
 
+#[cfg(feature = "video")]
+mod by_board;
 mod cameras;
 mod pictures;
-mod report;
 mod select;
 mod shots;
+mod silhouettes;
 
 pub use cameras::CameraSource;
+pub use select::Selected;
 pub use shots::{Shot, Shots};
 
 use crate::Error;
 use crate::stages::Stages;
 use capture::calibrate::MotionKind;
 use capture::footage::Footage;
-use capture::silhouette::{SilhouetteOptions, Silhouettes};
-use capture::{Board, Camera, Capture, Frame, Image, MaskSource};
+use capture::silhouette::Silhouettes;
+use capture::{Board, Capture, Frame, Image, MaskSource};
 use pictures::Pictures;
 use std::path::{Path, PathBuf};
 
@@ -50,20 +53,20 @@ pub struct FootageOptions {
 /// A capture made from footage, before it is written.
 #[derive(Debug)]
 pub struct CapturedFootage {
-    /// The frames that were kept; their pictures lie beside the place the capture will have, as long as this lives.
+    /// The frames that were kept. Their pictures lie beside the place the capture will have, as long as this lives.
     pub capture: Capture,
-    /// The mattes of the frames kept.
-    pub mattes: Vec<Image<u8>>,
     /// All frames of the footage.
     pub shots: Shots,
-    /// Per frame kept, its position in the footage.
+    /// Which of them were chosen, and why the others were not.
+    pub selected: Selected,
+    /// Silhouettes of the frames chosen; those that contradict the others are not in the capture.
+    pub silhouettes: Silhouettes,
+    /// Positions among the frames chosen of those in the capture.
     pub kept: Vec<usize>,
-    /// Per frame kept, how well its silhouette agrees with the hull of the others: IoU.
-    pub agreement: Vec<f64>,
-    _pictures: Pictures,
+    pictures: Pictures,
 }
 
-/// Makes a capture of footage. Pictures are kept beside `output` meanwhile.
+/// Makes a capture of footage; `output` is where it will be written, and pictures are kept beside it meanwhile.
 ///
 /// # Errors
 /// Names what is wrong with the footage, and what to do.
@@ -74,12 +77,46 @@ pub fn capture_footage(
     stages: &mut Stages<'_>,
 ) -> Result<CapturedFootage, Error> {
     let shots = cameras::find_cameras(footage, options, stages)?;
-    let chosen = select::select(&shots, options);
-    let kept: Vec<usize> = chosen.kept();
-    let sources: Vec<_> = kept.iter().map(|&at| shots.shots[at].source.clone()).collect();
-    let beside = beside(output)?;
-    let pictures = stages.run("take frames", |observer| Pictures::extract(footage, &sources, &beside, observer))?;
-    let silhouettes = stages.run("silhouettes", |_| silhouettes::find(&pictures, &shots, &kept, options))?;
+    let selected = select::select(&shots, options);
+    let sources: Vec<_> = selected.kept.iter().map(|&at| shots.shots[at].source.clone()).collect();
+    if sources.is_empty() {
+        let fault = format!("{}: no frame can be used", footage.path().display());
+        return Err(Error::Failed(format!("{fault}; {}", selected.why_none())));
+    }
+    let beside = crate::output::parent(output);
+    let pictures = stages.run("take frames", |observer| Pictures::extract(footage, &sources, beside, observer))?;
+    let silhouettes = stages.run("silhouettes", |_| silhouettes::find(&pictures, &shots, &selected.kept, options))?;
     stages.run("even out", |_| pictures.even_out(&silhouettes.gains))?;
-    todo!()
+    let kept: Vec<usize> = (0..sources.len()).filter(|at| !silhouettes.contradicting.contains(at)).collect();
+    let frame = |&at: &usize| {
+        let camera = shots.shots[selected.kept[at]].camera?;
+        let image_path = pictures.file(at).to_owned();
+        Some(Frame { image_path, mask_path: None, camera, light_direction: None, exposure: None })
+    };
+    let frames: Vec<Frame> = kept.iter().filter_map(frame).collect();
+    let capture = Capture { frames, aabb: silhouettes.aabb, unit: shots.unit, mask_source: MaskSource::Automatic };
+    Ok(CapturedFootage { capture, shots, selected, silhouettes, kept, pictures })
+}
+
+impl CapturedFootage {
+    /// The mattes of the frames in the capture.
+    pub fn mattes(&self) -> Vec<Image<u8>> {
+        self.kept.iter().map(|&at| self.silhouettes.mattes[at].clone()).collect()
+    }
+
+    /// Reads the picture of a frame chosen.
+    ///
+    /// # Errors
+    /// Where it was removed meanwhile.
+    pub fn picture(&self, at: usize) -> Result<Image<[u8; 3]>, Error> {
+        Ok(self.pictures.read(at)?)
+    }
+
+    /// Writes the capture to `output`, whole or not at all.
+    ///
+    /// # Errors
+    /// As [`Capture::write`].
+    pub fn write(&self, output: &Path) -> Result<(), Error> {
+        Ok(self.capture.write_with_mattes(&self.mattes(), output)?)
+    }
 }

@@ -2,7 +2,7 @@
 
 use crate::Error;
 use crate::stages::Observer;
-use capture::footage::{Footage, FootageFrame, FrameSource, read_upright};
+use capture::footage::{Footage, FootageFrame, FrameSource};
 use capture::{CaptureError, Image, read_rgb, write_rgb};
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
@@ -14,7 +14,7 @@ const BATCH: usize = 8;
 /// Chosen frames as PNG in a folder of their own, which goes when this does.
 #[derive(Debug)]
 pub(super) struct Pictures {
-    folder: TempDir,
+    _folder: TempDir,
     files: Vec<PathBuf>,
 }
 
@@ -55,7 +55,7 @@ impl Pictures {
             written += batch.len();
             observer.advanced(written, chosen.len());
         }
-        Ok(Self { folder, files })
+        Ok(Self { _folder: folder, files })
     }
 
     /// The file of a picture.

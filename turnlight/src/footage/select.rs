@@ -1,21 +1,50 @@
 //! Which frames of the footage become the capture.
 
 use super::{FootageOptions, Shots};
-use capture::choose::{Choice, ChooseOptions, FilmFrame, Viewpoint, choose_frames};
+use capture::choose::{Choice, ChooseOptions, DropReason, Dropped, FilmFrame, Viewpoint, choose_frames};
 
 /// Standpoints whose heights above the table differ by less see the same ring, radians.
 const SAME_HEIGHT: f64 = 0.06;
 
+/// The frames chosen.
+#[derive(Clone, Debug, Default)]
+pub struct Selected {
+    /// Positions in the footage, ascending.
+    pub kept: Vec<usize>,
+    /// All others, ascending, and why.
+    pub dropped: Vec<Dropped>,
+    /// The choice for every height at which the camera stood; positions are in the footage.
+    pub rings: Vec<Choice>,
+}
+
 /// Chooses frames for every height of the camera, and puts the choices together.
-pub(super) fn select(shots: &Shots, options: &FootageOptions) -> Vec<(Vec<usize>, Choice)> {
+pub(super) fn select(shots: &Shots, options: &FootageOptions) -> Selected {
     let groups = heights(shots);
     let usual = ChooseOptions::default();
     let most = (options.most.unwrap_or(usual.most * groups.len()) / groups.len()).max(1);
-    let choose = |members: &Vec<usize>| {
+    let mut selected = Selected::default();
+    for members in &groups {
         let frames: Vec<FilmFrame> = members.iter().map(|&at| film_frame(shots, at)).collect();
-        (members.clone(), choose_frames(&frames, &ChooseOptions { most, ..usual }))
-    };
-    groups.iter().map(choose).collect()
+        let mut choice = choose_frames(&frames, &ChooseOptions { most, ..usual });
+        choice.kept.iter_mut().for_each(|at| *at = members[*at]);
+        choice.dropped.iter_mut().for_each(|dropped| dropped.position = members[dropped.position]);
+        selected.kept.extend(&choice.kept);
+        selected.dropped.extend(&choice.dropped);
+        selected.rings.push(choice);
+    }
+    selected.kept.sort_unstable();
+    selected.dropped.sort_by_key(|dropped| dropped.position);
+    selected
+}
+
+impl Selected {
+    /// What most often kept frames out, as a remedy.
+    pub(super) fn why_none(&self) -> String {
+        let count = |reason: DropReason| self.dropped.iter().filter(|d| d.reason == reason).count();
+        let reasons = [DropReason::NoPose, DropReason::RejectedPose, DropReason::Blurred];
+        let worst = reasons.into_iter().max_by_key(|&reason| count(reason));
+        worst.map_or_else(String::new, |reason| format!("{} of {} frames: {reason}", count(reason), self.dropped.len()))
+    }
 }
 
 fn film_frame(shots: &Shots, at: usize) -> FilmFrame {
