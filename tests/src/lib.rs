@@ -1,5 +1,7 @@
 //! What the whole-pipeline tests share: the command, captures to break, and where real data lies.
 
+pub mod cartoon;
+
 use data_synth::{Effort, Scene, SynthOptions, synthesize};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
