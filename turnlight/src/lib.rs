@@ -4,6 +4,7 @@
 //! - [`pipeline`]: views → hull → simplified mesh → atlas → appearance;
 //! - [`evaluate`]: the four methods on held-out views, as JSON, CSV and one HTML page;
 //! - [`film`]: films of every kind this build can write;
+//! - [`footage_report`]: what became of footage, as a page;
 //! - [`inspect`]: what a mesh, a model or a capture holds;
 //! - [`output`]: files and folders that appear whole or not at all;
 //! - [`stages`]: what each stage costs;
@@ -12,6 +13,7 @@
 mod error;
 pub mod evaluate;
 pub mod film;
+pub mod footage_report;
 pub mod inspect;
 pub mod output;
 pub mod pipeline;
