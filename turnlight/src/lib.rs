@@ -5,6 +5,7 @@
 //! - [`evaluate`]: the four methods on held-out views, as JSON, CSV and one HTML page;
 //! - [`film`]: films of every kind this build can write;
 //! - [`footage`]: from films and photographs to a capture;
+//! - [`footage_report`]: what became of footage, as a page;
 //! - [`inspect`]: what a mesh, a model or a capture holds;
 //! - [`output`]: files and folders that appear whole or not at all;
 //! - [`stages`]: what each stage costs;
@@ -14,6 +15,7 @@ mod error;
 pub mod evaluate;
 pub mod film;
 pub mod footage;
+pub mod footage_report;
 pub mod inspect;
 pub mod output;
 pub mod pipeline;

@@ -189,17 +189,21 @@ fn all<T>(frames: &[&FilmFrame], place: impl Fn(&&FilmFrame) -> Option<T>) -> Op
 
 /// Azimuth of each direction about `up` in radians, each within half a turn of the one before.
 fn azimuths(directions: &[Vector3<f64>], up: Vector3<f64>) -> Vec<f64> {
-    let up = Unit::try_new(up, 1e-12).unwrap_or(Vector3::z_axis());
-    let aside = if up.x.abs() < 0.9 { Vector3::x() } else { Vector3::y() };
-    let x = (aside - up.into_inner() * up.dot(&aside)).normalize();
-    let y = up.cross(&x);
     let mut last = 0.0;
-    let azimuth = |d: &Vector3<f64>| {
-        let azimuth = d.dot(&y).atan2(d.dot(&x));
-        last += (azimuth - last + PI).rem_euclid(TAU) - PI;
+    let unwrapped = |direction: &Vector3<f64>| {
+        last += (azimuth(direction, &up) - last + PI).rem_euclid(TAU) - PI;
         last
     };
-    directions.iter().map(azimuth).collect()
+    directions.iter().map(unwrapped).collect()
+}
+
+/// Azimuth of a direction about `up` in (−π, π], right-handed, from +x (from +y where `up` is ±x); an `up` without
+/// length counts as +z.
+pub fn azimuth(direction: &Vector3<f64>, up: &Vector3<f64>) -> f64 {
+    let up = Unit::try_new(*up, 1e-12).unwrap_or(Vector3::z_axis());
+    let aside = if up.x.abs() < 0.9 { Vector3::x() } else { Vector3::y() };
+    let x = (aside - up.into_inner() * up.dot(&aside)).normalize();
+    direction.dot(&up.cross(&x)).atan2(direction.dot(&x))
 }
 
 /// The way from the first frame to each; the number of frames where nothing moves.

@@ -13,6 +13,7 @@ mod sharpness;
 #[cfg(test)]
 mod tests;
 
+pub use candidates::azimuth;
 pub use sharpness::sharpness;
 
 use candidates::Candidates;
