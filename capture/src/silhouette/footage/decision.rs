@@ -1,0 +1,37 @@
+//! From odds to a silhouette: near the hull of all views the odds decide, far from it the hull does.
+
+use super::Odds;
+use crate::Image;
+use crate::matte::{components, signed_distance};
+
+/// Pixels outside the hull at which nothing can be object: what the hull itself may be off.
+const REACH: f32 = 1.5;
+
+/// Log odds gained well inside the hull.
+const TRUST: f32 = 3.0;
+
+/// Object (255) or not, for voting where no hull is known yet: in between where the odds are even.
+pub(super) fn guessed(odds: &Odds) -> Image<u8> {
+    odds.log_odds.map(|l| (255.0 / (1.0 + (-0.7 * l).exp())) as u8)
+}
+
+/// The silhouette (255 or 0). `hull` is that of all views, object from 128 on.
+pub(super) fn decided(odds: &Odds, hull: &Image<u8>) -> Image<u8> {
+    let distance = signed_distance(hull);
+    let object = odds.log_odds.pixels().iter().zip(distance.pixels()).map(|(&l, &d)| {
+        let prior = (0.5 * d).clamp(-TRUST, TRUST);
+        d > -REACH && l + prior > 0.0
+    });
+    let mask = Image::from_pixels(hull.width(), hull.height(), object.collect()).unwrap_or_default();
+    without_specks(&mask)
+}
+
+/// Drops parts below a hundredth of the largest, fills holes below a two-thousandth of the object.
+fn without_specks(mask: &Image<bool>) -> Image<u8> {
+    let (sizes, labels) = components(mask);
+    let largest = sizes.iter().max().copied().unwrap_or(0);
+    let kept = labels.map(|l| l > 0 && sizes[l as usize - 1] * 100 >= largest);
+    let object = kept.pixels().iter().filter(|k| **k).count();
+    let (holes, labels) = components(&kept.map(|k| !k));
+    labels.map(|l| if l > 0 && holes[l as usize - 1] > object / 2000 { 0 } else { 255 })
+}

@@ -1,0 +1,81 @@
+//! How likely each pixel shows the object: what room and target explain is background, in full light or in shadow;
+//! what they do not, or what has the object's colours, is object.
+//!
+//! With background `b`, its deviation σ (encoded levels) and the object's palette `q`, the log odds of a colour `v`
+//! are `ln q(v) − ln max(0.85 N(v; b, σ²I), 0.13 S(v), 0.02 / 256³)`, where the shadow `S` spreads evenly along
+//! `r b` for r from 0.35 to 1 and as a Gaussian across (Horprasert, Harwood and Davis, A Statistical Approach for
+//! Real-time Robust Background Subtraction and Shadow Detection, 1999, put shadow on the same line).
+
+use super::cluster::Cluster;
+use super::light::Toned;
+use super::palette::Palette;
+use super::shade::Shade;
+use crate::Image;
+use crate::matte::blur;
+
+/// Noise of sensor and codec, encoded levels.
+const NOISE: f32 = 3.0;
+
+/// Of what is expected: light that is not quite as smooth as thought.
+const LIGHT_ERROR: f32 = 0.03;
+
+/// The least of what is left of the (encoded) light in shadow.
+const DEEPEST_SHADOW: f32 = 0.35;
+
+/// Odds of one pixel are not trusted beyond this: neighbours share their errors.
+const LARGEST: f32 = 8.0;
+
+/// What a frame shows behind the object.
+#[derive(Debug)]
+pub(super) struct Odds {
+    /// Natural logarithm of the odds for the object.
+    pub(super) log_odds: Image<f32>,
+    /// What would be seen in place of the object, encoded levels; `None` where that is unknown.
+    pub(super) background: Image<Option<[f32; 3]>>,
+}
+
+/// Of a picture, given what room and target look like from there (support 0 where they are unknown).
+pub(super) fn of(
+    picture: &Toned,
+    room: Option<&Image<Cluster>>,
+    target: Option<(&Image<Cluster>, &Shade)>,
+    palette: &Palette,
+    size: (usize, usize),
+) -> Odds {
+    let (width, height) = size;
+    let mut log_odds = Image::filled(width, height, 0.0);
+    let mut background = Image::filled(width, height, None);
+    for y in 0..height {
+        for x in 0..width {
+            let on_target = target.map(|(seen, shade)| {
+                let factor = shade.at(x as f64 + 0.5, y as f64 + 0.5);
+                let cluster = seen.at(x, y);
+                Cluster { colour: cluster.colour.map(|v| v * factor), ..cluster }
+            });
+            let known = |c: &Cluster| c.support > 0;
+            // The target hides the room.
+            let Some(behind) = on_target.filter(known).or(room.map(|r| r.at(x, y)).filter(known)) else { continue };
+            let colour = picture.at(x, y);
+            let odds = palette.log_density(&colour) - log_density(&colour, &behind);
+            log_odds.set(x, y, odds.clamp(-LARGEST, LARGEST));
+            background.set(x, y, Some(behind.colour));
+        }
+    }
+    Odds { log_odds: blur(&log_odds, 0.7), background }
+}
+
+/// Natural logarithm of the density of `colour` where `behind` is seen.
+fn log_density(colour: &[f32; 3], behind: &Cluster) -> f32 {
+    let b = behind.colour;
+    let length = (b[0] * b[0] + b[1] * b[1] + b[2] * b[2]).sqrt();
+    let sigma = (behind.spread.powi(2) + NOISE.powi(2) + (LIGHT_ERROR * length * 0.58).powi(2)).sqrt();
+    let squares = |factor: f32| (0..3).map(|c| (colour[c] - factor * b[c]).powi(2)).sum::<f32>() / (sigma * sigma);
+    // ln √(2π)
+    let gauss = |squares: f32, dimensions: f32| -0.5 * squares - dimensions * (sigma.ln() + 0.919);
+    let lit = 0.85_f32.ln() + gauss(squares(1.0), 3.0);
+    let along = (0..3).map(|c| colour[c] * b[c]).sum::<f32>() / (length * length).max(1.0);
+    let shadow_length = (1.0 - DEEPEST_SHADOW) * length.max(1.0);
+    let in_shadow = gauss(squares(along.clamp(DEEPEST_SHADOW, 1.0)), 2.0) - shadow_length.max(2.5 * sigma).ln();
+    let anything = 0.02_f32.ln() - 3.0 * 256.0_f32.ln();
+    lit.max(0.13_f32.ln() + in_shadow).max(anything)
+}
