@@ -117,7 +117,7 @@ impl Capture {
     /// # Errors
     /// When a source file is missing, the disk is full, or `dir` holds something that is no capture.
     pub fn write(&self, dir: &Path) -> Result<(), CaptureError> {
-        write::write(self, None, dir)
+        write::write(self, None, &[], dir)
     }
 
     /// As [`Capture::write`], with `mattes` (one per frame, of its size) in place of the given masks.
@@ -125,7 +125,22 @@ impl Capture {
     /// # Errors
     /// As [`Capture::write`], and when the number of mattes is not that of the frames.
     pub fn write_with_mattes(&self, mattes: &[Image<u8>], dir: &Path) -> Result<(), CaptureError> {
-        write::write(self, Some(mattes), dir)
+        write::write(self, Some(mattes), &[], dir)
+    }
+
+    /// As [`Capture::write_with_mattes`], with a report beside the capture: `report.html` and `report.json`.
+    ///
+    /// # Errors
+    /// As [`Capture::write_with_mattes`].
+    pub fn write_with_report(
+        &self,
+        mattes: &[Image<u8>],
+        html: &str,
+        json: &str,
+        dir: &Path,
+    ) -> Result<(), CaptureError> {
+        let files = [("report.html", html.as_bytes()), ("report.json", json.as_bytes())];
+        write::write(self, Some(mattes), &files, dir)
     }
 
     /// The same capture with its masks and alpha channels ignored: silhouettes will be found in the

@@ -113,6 +113,21 @@ fn view(
     Ok(View { index, name, image, matte, is_complete, camera: frame.camera.downscaled(options.downscale) })
 }
 
+impl View {
+    /// The same view with image, matte and camera reduced by a whole factor (area average), at most to one pixel.
+    pub fn downscaled(&self, factor: usize) -> Self {
+        let factor = factor.clamp(1, self.image.width().min(self.image.height()).max(1));
+        Self {
+            index: self.index,
+            name: self.name.clone(),
+            image: reduced(&self.image, factor),
+            matte: reduced_matte(&self.matte, factor),
+            is_complete: self.is_complete,
+            camera: self.camera.downscaled(factor),
+        }
+    }
+}
+
 fn empty_remedy(source: MaskSource) -> &'static str {
     match source {
         MaskSource::Automatic => "leave the frame out, or give masks",

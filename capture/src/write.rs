@@ -6,7 +6,18 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-pub(crate) fn write(capture: &Capture, mattes: Option<&[Image<u8>]>, dir: &Path) -> Result<(), CaptureError> {
+/// Files that are written beside `transforms.json`, by name.
+pub(crate) type Beside<'a> = [(&'a str, &'a [u8])];
+
+/// What a capture folder may hold, and be replaced.
+const OURS: [&str; 5] = ["transforms.json", "images", "masks", "report.html", "report.json"];
+
+pub(crate) fn write(
+    capture: &Capture,
+    mattes: Option<&[Image<u8>]>,
+    files: &Beside,
+    dir: &Path,
+) -> Result<(), CaptureError> {
     if let Some(mattes) = mattes.filter(|m| m.len() != capture.frames.len()) {
         let fault = format!("{} mattes were given for {} frames", mattes.len(), capture.frames.len());
         return Err(CaptureError::invalid(dir, fault, "load all views and pass their mattes"));
@@ -21,6 +32,11 @@ pub(crate) fn write(capture: &Capture, mattes: Option<&[Image<u8>]>, dir: &Path)
     let beside = beside.map_err(|e| CaptureError::io(parent, e))?;
     let staged = beside.path().join("capture");
     fill(capture, mattes, &staged)?;
+    for (name, bytes) in files {
+        let to = staged.join(name);
+        fs::write(&to, bytes).map_err(|e| CaptureError::io(&to, e))?;
+        sync(&to)?;
+    }
     // The temporary folder keeps the replaced capture until it is dropped.
     if dir.exists() {
         let replaced = beside.path().join("replaced");
@@ -39,8 +55,7 @@ fn check_replaceable(dir: &Path) -> Result<(), CaptureError> {
     if !dir.exists() {
         return Ok(());
     }
-    let ours = ["transforms.json", "images", "masks"];
-    let foreign = |e: fs::DirEntry| !ours.contains(&e.file_name().to_string_lossy().as_ref());
+    let foreign = |e: fs::DirEntry| !OURS.contains(&e.file_name().to_string_lossy().as_ref());
     let mut entries = fs::read_dir(dir).map_err(|e| CaptureError::io(dir, e))?;
     if entries.any(|entry| entry.map_or(true, foreign)) {
         return Err(CaptureError::invalid(dir, "exists and holds other files", "choose another name, or remove it"));

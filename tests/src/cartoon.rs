@@ -175,7 +175,8 @@ impl Cartoon {
 /// Uniform noise of ± 2 levels, another in every frame.
 fn grain(x: usize, y: usize, camera: &Camera) -> f64 {
     let frame = (camera.rotation[(0, 0)] * 1e9) as i64 as u64;
-    let mut state = (x as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ (y as u64).wrapping_mul(0xc2b2_ae3d_27d4_eb4f) ^ frame;
+    let mut state =
+        (x as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ (y as u64).wrapping_mul(0xc2b2_ae3d_27d4_eb4f) ^ frame;
     state = (state ^ (state >> 31)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     state ^= state >> 29;
     4.0 * (state >> 11) as f64 / (1_u64 << 53) as f64 - 2.0

@@ -76,7 +76,10 @@ fn a_film_of_a_turntable_becomes_a_capture() {
         .map(|(&at, matte)| iou(matte, &drawn[at].matte))
         .collect();
     let mean = ious.iter().sum::<f64>() / ious.len() as f64;
-    println!("axis off by {axis:.4}°, angles by {worst:.4}°; {lens:?}; {} kept, IoU {mean:.4} {ious:.3?}", found.kept.len());
+    println!(
+        "axis off by {axis:.4}°, angles by {worst:.4}°; {lens:?}; {} kept, IoU {mean:.4} {ious:.3?}",
+        found.kept.len()
+    );
     found.shots.findings.iter().for_each(|finding| println!("{finding}"));
     assert!(axis < 0.1, "{axis}");
     assert!(worst < 0.1, "{worst}");

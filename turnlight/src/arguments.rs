@@ -216,6 +216,9 @@ pub(crate) struct CaptureFootageArgs {
     /// Picture of the set without object and table, one for every film or folder
     #[arg(long, value_name = "IMAGE")]
     pub(crate) clean_plate: Vec<PathBuf>,
+    /// Outline of a shiny ball that stands in the room, in pixels: its highlight shows where the light is
+    #[arg(long, value_name = "X,Y,RADIUS", value_parser = circle)]
+    pub(crate) light_ball: Option<[f64; 3]>,
     /// Frames to keep at most [default: 72 a turn]
     #[arg(long, value_name = "N", value_parser = frames)]
     pub(crate) frames: Option<usize>,
@@ -543,6 +546,14 @@ fn size(text: &str) -> Result<[usize; 2], String> {
 
 fn pixels(text: &str) -> Result<f64, String> {
     within(text, 0.0, 1000.0)
+}
+
+fn circle(text: &str) -> Result<[f64; 3], String> {
+    let parts: Vec<f64> = text.split(',').filter_map(|part| part.trim().parse().ok()).collect();
+    match parts[..] {
+        [x, y, radius] if x.is_finite() && y.is_finite() && radius > 1.0 && radius.is_finite() => Ok([x, y, radius]),
+        _ => Err("needs column, row and radius of a circle in pixels, as in 320,240,25".to_owned()),
+    }
 }
 
 fn tolerance(text: &str) -> Result<f64, String> {

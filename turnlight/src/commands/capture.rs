@@ -13,9 +13,19 @@ pub(crate) fn run(args: &CaptureFootageArgs, observer: &dyn Observer) -> Result<
     let footage = Footage::open(&args.footage)?;
     let mut stages = Stages::new(observer);
     let captured = capture_footage(&footage, &options(args)?, &args.output, &mut stages)?;
-    stages.run("write", |_| captured.write(&args.output))?;
-    let text = format!("{} frames kept\nwrote {}", captured.kept.len(), args.output.display());
-    let json = json!({ "capture": args.output, "kept": captured.kept.len(), "stages": stages.finished() });
+    let report = captured.report(&footage);
+    stages.run("write", |_| captured.write(&report, &args.output))?;
+    let text = format!(
+        "{}\n{} views\nwrote {}\nlook at {}",
+        report.text(),
+        captured.kept.len(),
+        args.output.display(),
+        args.output.join("report.html").display()
+    );
+    let mut json = json!(report);
+    json["capture"] = json!(args.output);
+    json["views"] = json!(captured.kept.len());
+    json["stages"] = json!(stages.finished());
     Ok(Answer { text, json })
 }
 
@@ -32,6 +42,7 @@ fn options(args: &CaptureFootageArgs) -> Result<FootageOptions, Error> {
         cameras: args.cameras.clone().map_or(CameraSource::Board, CameraSource::Calibrated),
         masks: args.masks.clone(),
         clean_plates: args.clean_plate.clone(),
+        light_ball: args.light_ball,
         most: args.frames,
     })
 }

@@ -11,16 +11,20 @@
 #[cfg(feature = "video")]
 mod by_board;
 mod cameras;
+mod light;
 mod pictures;
+mod report;
 mod select;
 mod shots;
 mod silhouettes;
 
 pub use cameras::CameraSource;
+pub use light::FootageLight;
 pub use select::Selected;
 pub use shots::{Shot, Shots};
 
 use crate::Error;
+use crate::footage_report::{self, FootageReport};
 use crate::stages::Stages;
 use capture::calibrate::MotionKind;
 use capture::footage::Footage;
@@ -46,6 +50,9 @@ pub struct FootageOptions {
     pub masks: Option<PathBuf>,
     /// Pictures of the set without the object, one per camera position.
     pub clean_plates: Vec<PathBuf>,
+    /// Column, row and radius in pixels of the outline of a shiny ball that stands in the room: its highlight shows
+    /// where the light is.
+    pub light_ball: Option<[f64; 3]>,
     /// Frames to keep at most; `None` for as many as [`capture::choose::ChooseOptions`] says.
     pub most: Option<usize>,
 }
@@ -63,6 +70,8 @@ pub struct CapturedFootage {
     pub silhouettes: Silhouettes,
     /// Positions among the frames chosen of those in the capture.
     pub kept: Vec<usize>,
+    /// What the light is fixed to; `None` where there is no object to see it on.
+    pub light: Option<FootageLight>,
     pictures: Pictures,
 }
 
@@ -87,15 +96,17 @@ pub fn capture_footage(
     let pictures = stages.run("take frames", |observer| Pictures::extract(footage, &sources, beside, observer))?;
     let silhouettes = stages.run("silhouettes", |_| silhouettes::find(&pictures, &shots, &selected.kept, options))?;
     stages.run("even out", |_| pictures.even_out(&silhouettes.gains))?;
+    let light = stages.run("light", |_| light::find(&pictures, &shots, &selected.kept, &silhouettes, options))?;
     let kept: Vec<usize> = (0..sources.len()).filter(|at| !silhouettes.contradicting.contains(at)).collect();
     let frame = |&at: &usize| {
         let camera = shots.shots[selected.kept[at]].camera?;
         let image_path = pictures.file(at).to_owned();
-        Some(Frame { image_path, mask_path: None, camera, light_direction: None, exposure: None })
+        let light_direction = light.as_ref().and_then(|light| light.directions[at]);
+        Some(Frame { image_path, mask_path: None, camera, light_direction, exposure: None })
     };
     let frames: Vec<Frame> = kept.iter().filter_map(frame).collect();
     let capture = Capture { frames, aabb: silhouettes.aabb, unit: shots.unit, mask_source: MaskSource::Automatic };
-    Ok(CapturedFootage { capture, shots, selected, silhouettes, kept, pictures })
+    Ok(CapturedFootage { capture, shots, selected, silhouettes, kept, light, pictures })
 }
 
 impl CapturedFootage {
@@ -112,11 +123,13 @@ impl CapturedFootage {
         Ok(self.pictures.read(at)?)
     }
 
-    /// Writes the capture to `output`, whole or not at all.
+    /// Writes the capture with its report to `output`, whole or not at all.
     ///
     /// # Errors
     /// As [`Capture::write`].
-    pub fn write(&self, output: &Path) -> Result<(), Error> {
-        Ok(self.capture.write_with_mattes(&self.mattes(), output)?)
+    pub fn write(&self, report: &FootageReport, output: &Path) -> Result<(), Error> {
+        let html = footage_report::html(report, &self.thumbnails()?);
+        let json = serde_json::to_string_pretty(report).map_err(|e| Error::Failed(format!("the report: {e}")))?;
+        Ok(self.capture.write_with_report(&self.mattes(), &html, &json, output)?)
     }
 }

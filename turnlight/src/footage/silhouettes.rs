@@ -19,7 +19,7 @@ pub(super) fn find(
     match &options.masks {
         Some(folder) => {
             let mattes = kept.iter().map(|&at| given(folder, shots, at)).collect::<Result<Vec<_>, _>>()?;
-            Ok(check_silhouettes(mattes, &setup)?)
+            Ok(check_silhouettes(&mattes, &setup)?)
         }
         None => Ok(find_silhouettes(&|at| pictures.read(at), &setup, &SilhouetteOptions::default())?),
     }

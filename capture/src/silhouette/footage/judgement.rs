@@ -27,7 +27,10 @@ pub fn check_silhouettes(mattes: &[Image<u8>], setup: &StageSetup) -> Result<Sil
     let fits = |(matte, camera): (&Image<u8>, &Camera)| (matte.width(), matte.height()) == size(camera);
     if mattes.len() != setup.cameras.len() || !mattes.iter().zip(&setup.cameras).all(fits) {
         let fault = "the silhouettes are not one per frame, of its size".to_owned();
-        return Err(CaptureError::Stage { fault, remedy: "give a mask for every frame, of the frame's size".to_owned() });
+        return Err(CaptureError::Stage {
+            fault,
+            remedy: "give a mask for every frame, of the frame's size".to_owned(),
+        });
     }
     let pairs: Vec<_> = setup.cameras.iter().zip(mattes).collect();
     let part = |&(camera, matte): &(&Camera, &Image<u8>)| Part::given(camera, matte);

@@ -113,7 +113,8 @@ impl Scene<'_> {
     /// One round from what is known to what is known then.
     pub(super) fn round(&self, belief: &Belief, round: &Round) -> Result<Found, CaptureError> {
         let count = self.setup.cameras.len();
-        let cutouts: Vec<Cutout> = self.setup.cameras.iter().map(|c| Cutout::around(&belief.bounds, c, MARGIN)).collect();
+        let cutouts: Vec<Cutout> =
+            self.setup.cameras.iter().map(|c| Cutout::around(&belief.bounds, c, MARGIN)).collect();
         let plates = self.plates(belief, &cutouts)?;
         let parts: Vec<_> = (0..count)
             .into_par_iter()

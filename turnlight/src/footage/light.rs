@@ -1,0 +1,151 @@
+//! What the light is fixed to, and where it is.
+
+use super::pictures::Pictures;
+use super::{FootageOptions, Shots};
+use crate::Error;
+use capture::light::{LightCheck, LightKind, ShadedSurface, ShadingSample, ball_from_outline, ball_light, judge_light};
+use capture::silhouette::Silhouettes;
+use capture::{Camera, View};
+use geometry::hull::{HullOptions, visual_hull};
+use geometry::{DepthMap, Mesh};
+use nalgebra::{Point2, Point3, Vector3};
+use rayon::prelude::*;
+use std::f64::consts::TAU;
+
+/// The light of footage.
+#[derive(Clone, Debug)]
+pub struct FootageLight {
+    /// What the shading of the object says.
+    pub check: LightCheck,
+    /// Per frame chosen, unit direction towards the light in the world, where a ball shows it.
+    pub directions: Vec<Option<Vector3<f64>>>,
+}
+
+/// Longer side of the pictures that are looked at: shading is coarse.
+const SIDE: usize = 320;
+/// Cells along the object's longest side.
+const CELLS: usize = 48;
+/// Places on the object whose shading is followed.
+const PLACES: usize = 300;
+/// Cosine of the steepest angle at which a place is looked at.
+const STEEPEST: f64 = 0.4;
+/// Points of the outline of a ball.
+const OUTLINE: usize = 32;
+
+/// Follows the shading of places on a coarse hull over the frames, and looks at the ball, if there is one.
+pub(super) fn find(
+    pictures: &Pictures,
+    shots: &Shots,
+    kept: &[usize],
+    silhouettes: &Silhouettes,
+    options: &FootageOptions,
+) -> Result<Option<FootageLight>, Error> {
+    let directions = directions(pictures, shots, kept, options)?;
+    let usable = |&at: &usize| !silhouettes.contradicting.contains(&at) && has_object(silhouettes, at);
+    let usable: Vec<usize> = (0..kept.len()).filter(usable).collect();
+    let view = |&at: &usize| small_view(pictures, shots, kept, silhouettes, at);
+    let views: Vec<_> = usable.par_iter().map(view).collect::<Vec<_>>().into_iter().collect::<Result<_, Error>>()?;
+    let views: Vec<View> = views.into_iter().flatten().collect();
+    let check = shading(&views, shots, kept, silhouettes);
+    Ok(check.map(|check| FootageLight { check, directions }))
+}
+
+fn has_object(silhouettes: &Silhouettes, at: usize) -> bool {
+    silhouettes.mattes[at].pixels().iter().any(|&v| v >= 128)
+}
+
+/// The frame at position `at` of those chosen, small.
+fn small_view(
+    pictures: &Pictures,
+    shots: &Shots,
+    kept: &[usize],
+    silhouettes: &Silhouettes,
+    at: usize,
+) -> Result<Option<View>, Error> {
+    let Some(camera) = shots.shots[kept[at]].camera else { return Ok(None) };
+    let (image, matte) = (pictures.read(at)?, silhouettes.mattes[at].clone());
+    let factor = image.width().max(image.height()).div_ceil(SIDE);
+    let view = View { index: at, name: String::new(), image, matte, is_complete: true, camera };
+    Ok(Some(view.downscaled(factor)))
+}
+
+/// `None` where the silhouettes leave no object.
+fn shading(views: &[View], shots: &Shots, kept: &[usize], silhouettes: &Silhouettes) -> Option<LightCheck> {
+    let hull_options = HullOptions {
+        resolution: Some(CELLS),
+        consensus: views.len() / 20,
+        grow_px: 0.5,
+        aabb: silhouettes.aabb,
+        ..HullOptions::default()
+    };
+    let mesh = visual_hull(views, &hull_options).ok()?.mesh;
+    let normals = mesh.vertex_normals();
+    let step = mesh.positions.len().div_ceil(PLACES).max(1);
+    let places: Vec<usize> = (0..mesh.positions.len()).step_by(step).collect();
+    let samples: Vec<Vec<ShadingSample>> = views
+        .par_iter()
+        .map(|view| {
+            let angle = shots.shots[kept[view.index]].angle.unwrap_or_else(|| azimuth(&view.camera));
+            seen(view, &mesh, &normals, &places, angle)
+        })
+        .collect();
+    let check = judge_light(&samples.concat(), ShadedSurface::AllAround);
+    // A camera that is carried around leaves object and light alone.
+    Some(if shots.calibration.is_some() && shots.turntable().is_none() {
+        LightCheck { kind: LightKind::Object, ..check }
+    } else {
+        check
+    })
+}
+
+fn azimuth(camera: &Camera) -> f64 {
+    let centre = camera.center();
+    -centre.y.atan2(centre.x)
+}
+
+/// Brightness of the places that the view sees well.
+fn seen(view: &View, mesh: &Mesh, normals: &[Vector3<f64>], places: &[usize], angle: f64) -> Vec<ShadingSample> {
+    let depth = DepthMap::render(mesh, &view.camera);
+    let eye = view.camera.center();
+    let sample = |&place: &usize| {
+        let position: Point3<f64> = mesh.positions[place];
+        let towards = (eye - position).normalize();
+        let at = view.camera.project(&position).filter(|p| view.camera.in_frame(p.pixel))?;
+        let [x, y] = [at.pixel.x as usize, at.pixel.y as usize];
+        let nearest = f64::from(depth.depth.at(x, y));
+        let is_seen =
+            normals[place].dot(&towards) > STEEPEST && at.depth < nearest * 1.01 && view.matte.at(x, y) == 255;
+        let brightness = view.image.at(x, y).map(|c| (f64::from(c) / 255.0).powf(2.2)).iter().sum();
+        is_seen.then_some(ShadingSample { angle, point: place, brightness })
+    };
+    places.iter().filter_map(sample).collect()
+}
+
+/// Where the highlight of the ball says the light is. The ball stands in the room: its outline is the same in all frames
+/// of a camera that stands still.
+fn directions(
+    pictures: &Pictures,
+    shots: &Shots,
+    kept: &[usize],
+    options: &FootageOptions,
+) -> Result<Vec<Option<Vector3<f64>>>, Error> {
+    let Some([x, y, radius]) = options.light_ball else { return Ok(vec![None; kept.len()]) };
+    if shots.turntable().is_none() {
+        let fault =
+            "--light-ball: the ball has to stand before a camera that stands still, and this camera was carried";
+        return Err(Error::Arguments(fault.to_owned()));
+    }
+    let on_outline = |k: usize| {
+        let angle = TAU * k as f64 / OUTLINE as f64;
+        Point2::new(x + radius * angle.cos(), y + radius * angle.sin())
+    };
+    let outline: Vec<Point2<f64>> = (0..OUTLINE).map(on_outline).collect();
+    let direction = |at: usize| {
+        let Some(camera) = shots.shots[kept[at]].camera else { return Ok(None) };
+        let ball = ball_from_outline(&camera, &outline);
+        let image = pictures.read(at)?;
+        Ok(ball.and_then(|ball| ball_light(&image, &camera, &ball)))
+    };
+    let found: Vec<Result<_, Error>> = (0..kept.len()).into_par_iter().map(direction).collect();
+    found.into_iter().collect()
+}
