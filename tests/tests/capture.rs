@@ -50,7 +50,7 @@ fn captured(path: &Path, options: &FootageOptions) -> CapturedFootage {
 fn iou(a: &Image<u8>, b: &Image<u8>) -> f64 {
     let both = a.pixels().iter().zip(b.pixels()).map(|(&a, &b)| (a >= 128, b >= 128));
     let (and, or) = both.fold((0, 0), |(and, or), (a, b)| (and + usize::from(a && b), or + usize::from(a || b)));
-    f64::from(and) / f64::from(or.max(1))
+    and as f64 / or.max(1) as f64
 }
 
 #[test]
@@ -87,4 +87,151 @@ fn a_film_of_a_turntable_becomes_a_capture() {
     assert!(mean > 0.985, "{mean}");
     // One turn is kept, what is beyond shows it again.
     assert!((40..=46).contains(&found.kept.len()), "{}", found.kept.len());
+}
+
+/// Runs the command on a film and returns what it complains of.
+fn complaint(path: &Path, more: &[&str]) -> String {
+    let folder = path.parent().expect("a folder");
+    let film = path.file_name().expect("a name").to_string_lossy();
+    let run = turnlight(folder, &[&["capture", &*film, "-o", "capture"][..], more].concat());
+    assert_eq!(run.code, Some(1), "{}{}", run.stdout, run.stderr);
+    assert!(!folder.join("capture").exists(), "a failed capture left something");
+    assert!(run.stderr.contains(&*film), "the file is not named: {}", run.stderr);
+    run.stderr
+}
+
+#[test]
+fn footage_that_is_none_is_refused_by_name() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("notes.mp4");
+    std::fs::write(&path, "a text named like a film").expect("written");
+    assert!(complaint(&path, &[]).contains("no film"));
+    std::fs::write(&path, "").expect("written");
+    assert!(complaint(&path, &[]).contains("empty"));
+}
+
+#[test]
+fn footage_without_a_board_says_what_to_do() {
+    let plain = vec![Image::filled(320, 240, [120, 90, 60]); 6];
+    let (_folder, path) = film_of(&plain);
+    let said = complaint(&path, &[]);
+    assert!(said.contains("no calibration board") && said.contains("turnlight board"), "{said}");
+}
+
+#[test]
+fn a_board_of_another_kind_is_counted() {
+    let cartoon = Cartoon::default();
+    let (_folder, path) = film_of(&images(&draw(&cartoon, &angles(4, 0.2))));
+    let said = complaint(&path, &["--board", "chessboard:9x6:25mm"]);
+    assert!(said.contains("in 0 of 4 frames"), "{said}");
+}
+
+#[test]
+fn a_table_that_never_turned_is_told() {
+    let cartoon = Cartoon::default();
+    let (_folder, path) = film_of(&images(&draw(&cartoon, &[0.3; 6])));
+    let said = complaint(&path, &["--motion", "turntable"]);
+    assert!(said.contains("turn"), "{said}");
+}
+
+#[test]
+fn a_film_cut_short_is_used_as_far_as_it_goes_or_refused() {
+    let cartoon = Cartoon::default();
+    let frames = images(&draw(&cartoon, &angles(24, 0.9)));
+    let (folder, path) = film_of(&frames);
+    let whole = std::fs::read(&path).expect("a film");
+    std::fs::write(&path, &whole[..whole.len() * 6 / 10]).expect("cut");
+    // The index of an .mp4 comes last.
+    assert!(complaint(&path, &[]).contains("cut off"));
+    let path = folder.path().join("film.avi");
+    write_film(&path, &frames);
+    let whole = std::fs::read(&path).expect("a film");
+    std::fs::write(&path, &whole[..whole.len() * 6 / 10]).expect("cut");
+    let found = captured(&path, &FootageOptions::default());
+    assert!(found.shots.shots.len() < 20);
+    assert!(found.shots.findings.iter().any(|finding| finding.contains("cut off")), "{:?}", found.shots.findings);
+}
+
+#[test]
+fn of_half_blurred_footage_the_sharp_half_is_kept() {
+    let cartoon = Cartoon::default();
+    let angles = angles(40, 1.0);
+    let mut frames = images(&draw(&cartoon, &angles));
+    let is_blurred = |k: usize| k % 4 >= 2;
+    for (k, frame) in frames.iter_mut().enumerate().filter(|(k, _)| is_blurred(*k)) {
+        *frame = (0..3).fold(frame.clone(), |image, _| smeared(&image, 4 + k % 2));
+    }
+    let (_folder, path) = film_of(&frames);
+    let found = captured(&path, &FootageOptions::default());
+    assert!(found.selected.kept.iter().all(|&k| !is_blurred(k)), "{:?}", found.selected.kept);
+    assert!(found.selected.kept.len() >= 16, "{:?}", found.selected.kept);
+    let report = found.report(&Footage::open(&[path]).expect("footage")).text();
+    assert!(report.contains("blurred"), "{report}");
+}
+
+/// The mean over `reach` pixels to the left and right.
+fn smeared(image: &Image<[u8; 3]>, reach: usize) -> Image<[u8; 3]> {
+    let mut smeared = image.clone();
+    for y in 0..image.height() {
+        for x in 0..image.width() {
+            let row = &image.row(y)[x.saturating_sub(reach)..(x + reach + 1).min(image.width())];
+            smeared.set(
+                x,
+                y,
+                [0, 1, 2].map(|c| (row.iter().map(|p| usize::from(p[c])).sum::<usize>() / row.len()) as u8),
+            );
+        }
+    }
+    smeared
+}
+
+#[test]
+fn a_camera_that_was_knocked_stands_in_two_places() {
+    let cartoon = Cartoon::default();
+    let knocked = Cartoon { elevation_deg: 32.0, ..cartoon.clone() };
+    let angles = angles(40, 1.0);
+    let mut drawn = draw(&cartoon, &angles[..20]);
+    drawn.extend(draw(&knocked, &angles[20..]));
+    let (_folder, path) = film_of(&images(&drawn));
+    let found = captured(&path, &FootageOptions::default());
+    assert_eq!(found.shots.standpoints().len(), 2, "{:?}", found.shots.findings);
+    assert!(found.shots.standpoints()[1].first.abs_diff(20) <= 1);
+    assert!(found.shots.findings.iter().any(|f| f.contains("20") && f.contains("moved")), "{:?}", found.shots.findings);
+}
+
+#[test]
+fn of_two_turns_one_is_kept() {
+    let cartoon = Cartoon::default();
+    let (_folder, path) = film_of(&images(&draw(&cartoon, &angles(60, 2.05))));
+    let found = captured(&path, &FootageOptions { most: Some(24), ..FootageOptions::default() });
+    assert!((20..=24).contains(&found.kept.len()), "{}", found.kept.len());
+    assert!((found.selected.rings[0].turns.expect("turns") - 2.0).abs() < 0.06);
+    assert!(found.selected.rings[0].is_closed);
+}
+
+#[test]
+fn an_object_of_the_backdrops_colour_is_named() {
+    let cartoon = Cartoon { balls: [[42, 150, 60], [45, 165, 62]], ..Cartoon::default() };
+    let (_folder, path) = film_of(&images(&draw(&cartoon, &angles(30, 1.0))));
+    let found = captured(&path, &FootageOptions::default());
+    assert!(found.silhouettes.findings.iter().any(|f| f.contains("colour")), "{:?}", found.silhouettes.findings);
+}
+
+#[test]
+fn a_carried_camera_is_told_from_a_turntable() {
+    let cartoon = Cartoon::default();
+    let carried = |k: usize| {
+        let wobble = (1.3 * k as f64).sin();
+        let held = Cartoon { elevation_deg: 30.0 + 6.0 * wobble, ..cartoon.clone() };
+        held.frame(TAU * (k as f64 + 0.4 * wobble) / 24.0)
+    };
+    let drawn: Vec<Drawn> = (0..24).map(carried).collect();
+    let (_folder, path) = film_of(&images(&drawn));
+    let found = captured(&path, &FootageOptions { board: Some(cartoon.board), ..FootageOptions::default() });
+    let motion = found.shots.calibration.as_ref().map(|c| c.motion.clone());
+    assert_eq!(motion, Some(Motion::FreeHand));
+    let ious = found.selected.kept.iter().zip(&found.silhouettes.mattes).map(|(&at, m)| iou(m, &drawn[at].matte));
+    let mean = ious.sum::<f64>() / found.selected.kept.len() as f64;
+    println!("IoU {mean:.4}");
+    assert!(mean > 0.95, "{mean}");
 }

@@ -222,6 +222,9 @@ pub(crate) struct CaptureFootageArgs {
     /// Frames to keep at most [default: 72 a turn]
     #[arg(long, value_name = "N", value_parser = frames)]
     pub(crate) frames: Option<usize>,
+    /// Make a model of the capture as well, as `turnlight model` does (.glb)
+    #[arg(long, value_name = "MODEL.glb")]
+    pub(crate) model: Option<PathBuf>,
 }
 
 /// What moves while it is filmed.

@@ -1,32 +1,56 @@
 //! `turnlight capture`: from footage to a capture.
 
+use super::check_extension;
 use crate::Answer;
 use crate::arguments::{CaptureFootageArgs, MotionArg};
 use serde_json::json;
-use turnlight::Error;
+use std::path::{Path, PathBuf};
 use turnlight::capture::calibrate::MotionKind;
 use turnlight::capture::footage::Footage;
+use turnlight::capture::{Capture, LoadOptions};
 use turnlight::footage::{CameraSource, FootageOptions, capture_footage};
+use turnlight::pipeline::ShapeOptions;
 use turnlight::stages::{Observer, Stages};
+use turnlight::texture::{FitOptions, Method};
+use turnlight::{Error, output, pipeline};
 
 pub(crate) fn run(args: &CaptureFootageArgs, observer: &dyn Observer) -> Result<Answer, Error> {
+    if let Some(model) = &args.model {
+        check_extension(model, &["glb"])?;
+    }
     let footage = Footage::open(&args.footage)?;
     let mut stages = Stages::new(observer);
     let captured = capture_footage(&footage, &options(args)?, &args.output, &mut stages)?;
     let report = captured.report(&footage);
+    let views = captured.kept.len();
     stages.run("write", |_| captured.write(&report, &args.output))?;
-    let text = format!(
-        "{}\n{} views\nwrote {}\nlook at {}",
+    drop(captured);
+    let model = args.model.as_ref().map(|model| make_model(&args.output, model, &mut stages)).transpose()?;
+    let mut text = format!(
+        "{}\n{views} views\nwrote {}\nlook at {}",
         report.text(),
-        captured.kept.len(),
         args.output.display(),
         args.output.join("report.html").display()
     );
     let mut json = json!(report);
     json["capture"] = json!(args.output);
-    json["views"] = json!(captured.kept.len());
+    json["views"] = json!(views);
+    if let Some(model) = &model {
+        text = format!("{text}\nwrote {}", model.display());
+        json["model"] = json!(model);
+    }
     json["stages"] = json!(stages.finished());
     Ok(Answer { text, json })
+}
+
+/// The model of a capture just written, with everything as usual.
+fn make_model(capture: &Path, output: &Path, stages: &mut Stages<'_>) -> Result<PathBuf, Error> {
+    let capture = Capture::read(capture)?;
+    let views = stages.run("load", |_| capture.load_all_views(&LoadOptions::default()))?;
+    let (shape, fit) = (ShapeOptions::default(), FitOptions::default());
+    let (model, _) = pipeline::model(&views, capture.aabb, Method::DynTex, &shape, &fit, stages)?;
+    stages.run("write model", |_| output::write_file(output, &model.to_glb()?))?;
+    Ok(output.to_owned())
 }
 
 fn options(args: &CaptureFootageArgs) -> Result<FootageOptions, Error> {
