@@ -15,7 +15,20 @@
 //! # Ok::<(), capture::calibrate::CalibrateError>(())
 //! ```
 
+mod bundle;
+mod clean;
 mod error;
+mod estimate;
+mod fill;
+mod findings;
+mod homography;
+mod layout;
+mod lens;
+mod pose;
+mod projection;
+mod result;
+mod rig;
+mod turntable;
 
 pub use error::CalibrateError;
 
@@ -169,7 +182,8 @@ pub struct LensReport {
     /// Fifth over first singular value of the constraints that flat views put on the lens (Zhang 2000); `None` for
     /// targets that are not flat. Below 1e-3 or so all views show the target at one tilt.
     pub constraint_ratio: Option<f64>,
-    /// Whether focal length or principal point rest on assumptions because the target was always seen at one tilt.
+    /// Whether focal length or principal point rest on assumptions, or on traces of distortion alone, because the target
+    /// was always seen at one tilt.
     pub is_degenerate: bool,
     /// What to do about it; empty where nothing needs doing.
     pub advice: String,
@@ -253,23 +267,20 @@ pub struct Filled {
     pub deviation: f64,
 }
 
-impl Calibration {
-    /// The camera of a film at a time without sighting, from the motion of the platter between the sightings around.
-    /// `None` without a turntable, where the camera was moved between those sightings, and where the angle would be
-    /// uncertain by more than a degree.
-    pub fn camera_at(&self, _film: usize, _time_s: f64) -> Option<Filled> {
-        None
-    }
-}
-
 /// Tells the cameras of the sightings.
 ///
 /// # Errors
 /// [`CalibrateError`] where the target or the options are none, too few pictures can be used, or nothing turns.
 pub fn calibrate(
-    _target: &Target,
+    target: &Target,
     sightings: &[Sighting],
-    _options: &CalibrateOptions,
+    options: &CalibrateOptions,
 ) -> Result<Calibration, CalibrateError> {
-    Err(CalibrateError::TooFew { usable: 0, sightings: sightings.len(), needed: 2 })
+    clean::check(target, options)?;
+    let mut cleaned = clean::clean(target, sightings);
+    let estimate = estimate::estimate(target, &mut cleaned, options)?;
+    Ok(result::result(&estimate, &cleaned, sightings))
 }
+
+#[cfg(test)]
+mod tests;
