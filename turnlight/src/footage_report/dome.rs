@@ -7,7 +7,7 @@ use std::fmt::Write;
 
 const SIZE: f64 = 420.0;
 /// Radius of the horizon.
-const RIM: f64 = 168.0;
+const RIM: f64 = 172.0;
 /// Half the width of what a gap's wedge covers around the elevations filmed, degrees.
 const WEDGE_DEG: f64 = 6.0;
 
@@ -61,8 +61,10 @@ fn push_grid(svg: &mut String) {
         let radius = RIM * (1.0 - f64::from(elevation) / 90.0);
         // Writing to a string cannot fail.
         let _ = write!(svg, "<circle class=\"grid\" cx=\"{middle}\" cy=\"{middle}\" r=\"{radius:.1}\"/>");
+    }
+    for elevation in [30, 60] {
         let [x, y] = place(Seen { azimuth: 75.0, elevation: f64::from(elevation) });
-        let _ = write!(svg, "<text class=\"ring\" x=\"{x:.1}\" y=\"{:.1}\">{elevation}°</text>", y - 3.0);
+        let _ = write!(svg, "<text x=\"{x:.1}\" y=\"{:.1}\">{elevation}° up</text>", y + 14.0);
     }
     for azimuth in (0..360).step_by(30) {
         let at = |elevation| place(Seen { azimuth: f64::from(azimuth), elevation });

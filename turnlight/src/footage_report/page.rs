@@ -45,7 +45,7 @@ pub fn html(report: &FootageReport, pictures: &[Thumbnail]) -> String {
     );
     push_verdict(&mut page, report);
     push_findings(&mut page, report);
-    page.push_str("<h2></h2><div class=\"columns\">\n");
+    page.push_str("<div class=\"columns\">\n");
     push_dome(&mut page, report);
     push_cameras(&mut page, report);
     push_dropped(&mut page, report);
@@ -103,9 +103,9 @@ fn push_dome(page: &mut String, report: &FootageReport) {
     let Some(svg) = dome::svg(report) else { return };
     let _ = writeln!(
         page,
-        "<section class=\"card\"><h2>Directions seen</h2>{svg}<p class=\"small\">From above: the horizon is the rim. \
-         <span class=\"key kept\"></span>kept<span class=\"key dropped\"></span>left out\
-         <span class=\"key gap\"></span>missing</p></section>"
+        "<section class=\"card\"><h2>Directions seen</h2>{svg}<p class=\"small legend\">\
+         <span><i class=\"key kept\"></i>kept</span><span><i class=\"key dropped\"></i>left out</span>\
+         <span><i class=\"key gap\"></i>missing</span><span>Seen from above; the rim is the horizon.</span></p></section>"
     );
 }
 
@@ -125,7 +125,7 @@ fn push_cameras(page: &mut String, report: &FootageReport) {
         board.rms_px.iter().for_each(|rms| row("reprojection, px RMS", format!("{rms:.3}")));
     }
     if let Some(axis) = &report.axis {
-        let vector = |v: [f64; 3]| v.map(|c| format!("{c:.4}")).join(", ");
+        let vector = |v: [f64; 3]| v.map(|c| format!("{c:.3}")).join(", ");
         let deviation = |d: Option<f64>| d.map(|d| format!(" ± {d:.3}°")).unwrap_or_default();
         row("axis through", vector(axis.point));
         row("axis along", vector(axis.direction) + &deviation(axis.deviation_deg));
