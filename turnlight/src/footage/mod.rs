@@ -95,6 +95,7 @@ pub fn capture_footage(
     let beside = crate::output::parent(output);
     let pictures = stages.run("take frames", |observer| Pictures::extract(footage, &sources, beside, observer))?;
     let silhouettes = stages.run("silhouettes", |_| silhouettes::find(&pictures, &shots, &selected.kept, options))?;
+    refuse_useless(footage, &selected, &silhouettes)?;
     stages.run("even out", |_| pictures.even_out(&silhouettes.gains))?;
     let light = stages.run("light", |_| light::find(&pictures, &shots, &selected.kept, &silhouettes, options))?;
     let kept: Vec<usize> = (0..sources.len()).filter(|at| !silhouettes.contradicting.contains(at)).collect();
@@ -107,6 +108,17 @@ pub fn capture_footage(
     let frames: Vec<Frame> = kept.iter().filter_map(frame).collect();
     let capture = Capture { frames, aabb: silhouettes.aabb, unit: shots.unit, mask_source: MaskSource::Automatic };
     Ok(CapturedFootage { capture, shots, selected, silhouettes, kept, light, pictures })
+}
+
+/// Without an object, or with a single view of it, there is nothing to write.
+fn refuse_useless(footage: &Footage, selected: &Selected, silhouettes: &Silhouettes) -> Result<(), Error> {
+    let views = selected.kept.len() - silhouettes.contradicting.len();
+    let fault = match (silhouettes.aabb, views) {
+        (None, _) => silhouettes.findings.join("; "),
+        (Some(_), 0..2) => format!("{views} view can be used; {}", selected.why_none()),
+        _ => return Ok(()),
+    };
+    Err(Error::Failed(format!("{}: {fault}", footage.path().display())))
 }
 
 impl CapturedFootage {
