@@ -98,7 +98,7 @@ pub(super) fn estimate(
     best.refine_lens();
     if let Poses::Turning(turning) = &best.rig.poses {
         let points = best.rig.shape.points();
-        best.rig.poses = Poses::Turning(canonical(turning, best.plane.as_ref(), &points));
+        best.rig.poses = Poses::Turning(canonical(turning, &best.pictures, best.plane.as_ref(), &points));
     }
     Ok(best)
 }

@@ -125,10 +125,16 @@ fn picture_findings(result: &Calibration) -> Vec<String> {
                 None => "it has no camera".to_owned(),
             };
             found.push(format!("Picture {} {why}; {then}.", frame.frame));
-        } else if 4 * frame.dropped.len() > frame.used.len() {
-            let dropped = list(&frame.dropped);
-            found.push(format!("Corners {dropped} of picture {} contradict the others; left out.", frame.frame));
         }
+    }
+    let doubtful = result.frames.iter().filter(|f| 4 * f.dropped.len() > f.used.len() && !f.used.is_empty());
+    let doubtful: Vec<usize> = doubtful.map(|f| f.frame).collect();
+    if !doubtful.is_empty() {
+        found.push(format!(
+            "In pictures {} a fifth of the corners or more contradict the others and are left out: something stands before \
+             them, or they are misread.",
+            list(&doubtful)
+        ));
     }
     let rejected = result.frames.iter().filter(|f| is_rejected(&f.standing)).count();
     if 2 * rejected > result.frames.len() {

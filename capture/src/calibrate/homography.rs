@@ -37,7 +37,7 @@ pub(super) fn fit(pairs: &[Pair]) -> Option<Matrix3<f64>> {
 /// [`fit`] to the pairs that agree with most others (least median of squares, Rousseeuw 1984), which are told.
 pub(super) fn fit_robust(pairs: &[Pair], seed: u64) -> Option<(Matrix3<f64>, Vec<bool>)> {
     let all = fit(pairs);
-    if pairs.len() < 8 {
+    if pairs.len() < 8 || all.as_ref().is_some_and(|map| agree(map, pairs)) {
         return all.map(|map| (map, vec![true; pairs.len()]));
     }
     let mut best = all.map(|map| (median(&distances(&map, pairs)), map));
@@ -56,6 +56,13 @@ pub(super) fn fit_robust(pairs: &[Pair], seed: u64) -> Option<(Matrix3<f64>, Vec
     let agrees: Vec<bool> = distances(&map, pairs).iter().map(|&d| d <= limit).collect();
     let kept: Vec<Pair> = pairs.iter().zip(&agrees).filter(|(_, a)| **a).map(|(p, _)| *p).collect();
     Some((fit(&kept)?, agrees))
+}
+
+/// Whether pairs lie about as far from where the map puts them as noise would.
+fn agree(map: &Matrix3<f64>, pairs: &[Pair]) -> bool {
+    let (distances, extent) = (distances(map, pairs), extent(pairs));
+    let middle = median(&distances);
+    middle < 3e-3 * extent && distances.iter().all(|&d| d <= 4.0 * middle + 1e-3 * extent)
 }
 
 /// RMS distance in the second plane.

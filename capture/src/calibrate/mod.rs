@@ -218,7 +218,8 @@ pub struct Turntable {
     pub axis_point: Point3<f64>,
     /// Unit direction of the axis in target coordinates: the world's z.
     pub axis_direction: Vector3<f64>,
-    /// Turn at each sighting in radians, unwrapped over several turns; 0 at the first. `None` where it is not known.
+    /// Turn at each sighting in radians, unwrapped over several turns; 0 at the first used. `None` where it is
+    /// not known.
     pub angles: Vec<Option<f64>>,
     /// When the camera stood where.
     pub segments: Vec<Segment>,

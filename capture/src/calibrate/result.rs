@@ -10,6 +10,7 @@ use super::turntable::unwrap;
 use super::{Calibration, Filled, FramePose, Motion, Segment, Sighting, Standing, Turntable};
 use crate::{Camera, Intrinsics};
 use nalgebra::{Isometry3, Point3, Vector3};
+use std::f64::consts::TAU;
 
 /// Everything a user is told.
 pub(super) fn result(estimate: &Estimate, cleaned: &Cleaned, sightings: &[Sighting]) -> Calibration {
@@ -76,7 +77,7 @@ fn camera(lens: &Intrinsics, pose: &Isometry3<f64>) -> Camera {
 fn rms(rig: &Rig, picture: &Picture, k: usize) -> f64 {
     let used: Vec<_> = picture.corners.iter().filter(|c| c.is_used && picture.is_used).copied().collect();
     let squares = rig.residuals(k, &used).into_iter().flatten().map(|r| r.norm_squared()).sum::<f64>();
-    (squares / used.len().max(1) as f64).sqrt()
+    (squares / used.len().max(1) as f64).sqrt().abs()
 }
 
 /// Why a picture was not used.
@@ -101,15 +102,24 @@ fn turntable(turning: &Turning, pictures: &[Picture]) -> Turntable {
     let mut angles = vec![None; pictures.len()];
     let mut segments = Vec::new();
     let mut speeds = Vec::new();
+    let mut end: Option<(f64, f64, f64)> = None;
     for (s, pose) in turning.segments.iter().enumerate() {
         let members = || (0..pictures.len()).filter(|&k| turning.segment_of[k] == s);
         let (Some(first), Some(last)) = (members().next(), members().next_back()) else { continue };
+        end = end.filter(|_| segments.last().is_some_and(|s: &Segment| s.film == pictures[first].film));
         let used = members().filter(|&k| pictures[k].is_used);
         let mut known: Vec<(usize, f64, f64)> = used.map(|k| (k, pictures[k].time_s, turning.angles[k])).collect();
         known.sort_by(|a, b| a.1.total_cmp(&b.1));
         unwrap(&mut known);
+        // A moved camera does not stop the platter.
+        if let (Some(&(time, angle, rate)), Some(&next)) = (end.as_ref(), known.first()) {
+            let turns = ((angle + rate * (next.1 - time) - next.2) / TAU).round();
+            known.iter_mut().for_each(|k| k.2 += TAU * turns);
+        }
         known.iter().for_each(|&(k, _, angle)| angles[k] = Some(angle));
-        speeds.push(Track::new(known.iter().map(|&(_, t, a)| (t, a)).collect()).speed());
+        let speed = Track::new(known.iter().map(|&(_, t, a)| (t, a)).collect()).speed();
+        end = known.last().map(|&(_, time, angle)| (time, angle, speed.unwrap_or(0.0)));
+        speeds.push(speed);
         segments.push(Segment { first, last, film: pictures[first].film, pose: *pose });
     }
     let target_from_world = turning.world_from_target.inverse();

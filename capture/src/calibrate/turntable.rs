@@ -307,7 +307,23 @@ pub(super) fn divided(turning: &Turning, pictures: &[Picture], segment: usize, a
         let most = members.max_by_key(|&k| (pictures[k].is_used, pictures[k].corners.len(), pictures.len() - k));
         next.references[s] = most.unwrap_or(at);
     }
-    next
+    next.in_order()
+}
+
+impl Turning {
+    /// Segments numbered as their pictures come.
+    fn in_order(self) -> Self {
+        let first = |s: usize| self.segment_of.iter().position(|&of| of == s);
+        let mut order: Vec<usize> = (0..self.segments.len()).collect();
+        order.sort_by_key(|&s| first(s));
+        let new = |s: usize| order.iter().position(|&old| old == s).unwrap_or(s);
+        Self {
+            segments: order.iter().map(|&s| self.segments[s]).collect(),
+            references: order.iter().map(|&s| self.references[s]).collect(),
+            segment_of: self.segment_of.iter().map(|&s| new(s)).collect(),
+            ..self
+        }
+    }
 }
 
 /// The angle at which a segment's camera sees a picture's corners best, found from all sides; with the median distance
@@ -342,7 +358,12 @@ pub(super) fn best_angle(rig: &Rig, turning: &Turning, picture: &Picture, segmen
 
 /// The same platter in the axes of [`world_from_target`], the first segment's camera at angle 0 at its first picture,
 /// the others turned about the axis to where they are nearest to it.
-pub(super) fn canonical(turning: &Turning, plane: Option<&Isometry3<f64>>, points: &[Point3<f64>]) -> Turning {
+pub(super) fn canonical(
+    turning: &Turning,
+    pictures: &[Picture],
+    plane: Option<&Isometry3<f64>>,
+    points: &[Point3<f64>],
+) -> Turning {
     let target_from_world = turning.world_from_target.inverse();
     let axis =
         Axis { point: target_from_world * Point3::origin(), direction: target_from_world.rotation * Vector3::z() };
@@ -357,7 +378,8 @@ pub(super) fn canonical(turning: &Turning, plane: Option<&Isometry3<f64>>, point
     }
     next.angles.iter_mut().for_each(|angle| *angle *= sign);
     for s in 0..next.segments.len() {
-        let Some(first) = next.segment_of.iter().position(|&of| of == s) else { continue };
+        let is_first = |k: &usize| next.segment_of[*k] == s && pictures[*k].is_used;
+        let Some(first) = (0..pictures.len()).find(is_first) else { continue };
         let by = if s == 0 { next.angles[first] } else { nearest_turn(&next.segments[0], &next.segments[s]) };
         next.segments[s] = turned(&next.segments[s], by);
         for (angle, _) in next.angles.iter_mut().zip(&next.segment_of).filter(|(_, of)| **of == s) {

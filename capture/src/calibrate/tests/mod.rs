@@ -1,7 +1,12 @@
 //! Cameras told from corners whose truth is known.
 
+mod faults;
+mod lens;
+mod platter;
+mod targets;
+
 use super::*;
-use crate::{Board, Distortion};
+use crate::Distortion;
 use nalgebra::{Rotation3, UnitQuaternion};
 use std::f64::consts::{PI, TAU};
 
@@ -170,68 +175,4 @@ fn angle_error_deg(result: &Calibration, truth: &[f64]) -> f64 {
 
 fn axis_error_deg(result: &Calibration, film: &Film) -> f64 {
     platter(result).axis_direction.angle(&film.axis.1).to_degrees()
-}
-
-#[test]
-fn a_known_lens_and_a_tilted_axis_give_axis_and_angles() {
-    let film = Film::new(25.0, 36);
-    let result = of_board(&film.sightings(1), &known());
-    let turntable = platter(&result);
-    println!(
-        "axis {:.4}°, angles {:.4}°, {:.3} px",
-        axis_error_deg(&result, &film),
-        angle_error_deg(&result, &film.angles),
-        result.rms_px
-    );
-    println!("{:#?}", result.findings);
-    assert!(axis_error_deg(&result, &film) < 0.02);
-    assert!(angle_error_deg(&result, &film.angles) < 0.01);
-    let foot = turntable.axis_point - film.axis.0;
-    assert!((foot - film.axis.1 * foot.dot(&film.axis.1)).norm() < 5e-5, "{foot}");
-    assert_eq!(result.intrinsics, lens());
-    // 0.1 px each way, less what the parameters take up.
-    assert!((result.rms_px - 0.1414).abs() < 0.01, "{}", result.rms_px);
-    assert_eq!(turntable.segments.len(), 1);
-}
-
-#[test]
-fn a_flat_board_alone_leaves_the_lens_to_assumptions_and_says_so() {
-    let result = of_board(&Film::flat(25.0, 36).sightings(2), &options());
-    println!("{:#?}\n{:#?}", result.lens, result.findings);
-    assert!(result.lens.is_degenerate);
-    assert!(result.lens.advice.contains("height"));
-    assert!(result.lens.constraint_ratio.unwrap() < 1e-2);
-    let focal = term(&result, LensParameter::Focal);
-    assert!((focal.value - 1180.0).abs() < 4.0 * focal.deviation, "{focal:?}");
-}
-
-#[test]
-fn two_heights_tell_the_lens_from_nothing() {
-    let (low, high) = (Film::flat(25.0, 36), Film::flat(50.0, 36));
-    let mut sightings = low.sightings(3);
-    sightings.extend(high.sightings(4).into_iter().map(|s| Sighting { film: 1, ..s }));
-    let result = of_board(&sightings, &options());
-    println!("{:#?}\n{:#?}", result.lens, result.findings);
-    assert!((result.intrinsics.fx / 1180.0 - 1.0).abs() < 0.003, "{}", result.intrinsics.fx);
-    assert!(!result.lens.is_degenerate);
-    assert_eq!(platter(&result).segments.len(), 2);
-}
-
-#[test]
-fn a_board_waved_by_hand_tells_the_lens() {
-    let result = of_board(&waved(&lens(), 20, 0.1, 5), &options());
-    println!("{:#?}\n{:#?}", result.lens, result.findings);
-    assert_eq!(result.motion, Motion::FreeHand);
-    let truth = [
-        (LensParameter::Focal, 1180.0),
-        (LensParameter::Cx, 652.0),
-        (LensParameter::Cy, 351.0),
-        (LensParameter::K1, -0.06),
-    ];
-    for (parameter, truth) in truth {
-        let term = term(&result, parameter);
-        assert_eq!(term.source, Source::Footage, "{term:?}");
-        assert!((term.value - truth).abs() < 4.0 * term.deviation, "{term:?} for {truth}");
-    }
-    assert!((result.intrinsics.fx / 1180.0 - 1.0).abs() < 0.002);
 }
