@@ -193,7 +193,8 @@ fn cannot(path: &Path, fault: &std::io::Error) -> Error {
     Error::Failed(format!("{}: {fault}; check the path and the space on the disk", path.display()))
 }
 
-#[cfg(all(test, unix))]
+#[cfg(test)]
+#[cfg(unix)]
 mod tests {
     use super::*;
     use crate::stages::Silent;
