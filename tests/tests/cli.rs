@@ -1,6 +1,7 @@
 //! The command as a stranger meets it: exit codes, messages, purity of standard output, output that
 //! appears whole or not at all, the same bytes from every run.
 
+use capture::Capture;
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
@@ -78,6 +79,11 @@ fn wrong_arguments_return_2() {
         &["synth", "temple", "-o", "s", "--size", "10"],
         &["synth", "unheard-of", "-o", "s"],
         &["info", "capture", "--quiet", "-v"],
+        &["turntable", "capture/images", "-o", "t", "--camera", "capture"],
+        &["turntable", "capture/images", "-o", "t", "--camera", "capture", "--step", "0"],
+        &["turntable", "capture/images", "-o", "t", "--camera", "capture", "--step", "5", "--angles", "a.txt"],
+        &["turntable", "capture/images", "-o", "t", "--camera", "capture", "--step", "5", "--axis", "0,0,0"],
+        &["turntable", "capture/images", "-o", "t", "--camera", "capture", "--step", "5", "--view", "99"],
         &["info", "capture", "--truth", "capture/truth.ply"],
         &["info", "capture/truth.ply", "--tolerance", "1"],
         &["info", "capture/truth.ply", "--truth", "capture/truth.ply", "--tolerance", "-1"],
@@ -493,6 +499,24 @@ fn synth_films_as_asked_and_keeps_the_truth_beside() {
     assert_ne!(capture["frames"][1]["transform_matrix"], truth["frames"][1]["transform_matrix"]);
     assert_ne!(truth["frames"][0]["exposure"], truth["frames"][1]["exposure"]);
     assert!(!place.path().join("faulty/truth").exists());
+}
+
+#[test]
+fn one_camera_an_axis_and_a_step_make_the_capture_again() {
+    let place = place();
+    // The cameras of the scene go around z at one height: the object turns the other way.
+    let step = format!("--step=-{}", 360 / VIEWS);
+    let args = ["turntable", "capture/images", "-o", "made", "--camera", "capture", &step, "--json"];
+    let answer = json(&turnlight(place.path(), &args));
+    assert_eq!((answer["views"].as_u64(), answer["masks"].as_str()), (Some(VIEWS as u64), Some("masks_image")));
+    let cameras = |name: &str| Capture::read(&place.path().join(name)).expect("a capture").frames;
+    for (made, truth) in cameras("made").iter().zip(cameras("capture")) {
+        assert!((made.camera.translation - truth.camera.translation).norm() < 1e-9);
+        assert!((made.camera.rotation - truth.camera.rotation).norm() < 1e-9);
+    }
+    fs::write(place.path().join("angles.txt"), "0\n45\n").expect("written");
+    let few = ["turntable", "capture/images", "-o", "t", "--camera", "capture", "--angles", "angles.txt"];
+    assert_fails(place.path(), &few, &["capture/images", "holds 8 images, 2 angles are given"]);
 }
 
 #[test]

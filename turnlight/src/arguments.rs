@@ -66,6 +66,8 @@ pub(crate) enum Command {
     Render(RenderArgs),
     /// Render a synthetic capture whose truth is known
     Synth(SynthArgs),
+    /// Make a capture of stills on a turntable from one calibrated camera, the axis and the angles
+    Turntable(TurntableArgs),
 }
 
 /// What is done with bidirectional texture functions.
@@ -458,6 +460,34 @@ pub(crate) struct FaultArgs {
     pub(crate) distortion: Option<f64>,
 }
 
+#[derive(Debug, Args)]
+#[command(group = clap::ArgGroup::new("turn").required(true))]
+pub(crate) struct TurntableArgs {
+    /// The folder of the photographs, taken in the order of their names; masks are found beside them or in masks/
+    pub(crate) photographs: PathBuf,
+    /// The capture to write
+    #[arg(short, long, value_name = "CAPTURE")]
+    pub(crate) output: PathBuf,
+    /// A capture, or transforms.json, with the calibrated camera of the first photograph
+    #[arg(long, value_name = "CAPTURE")]
+    pub(crate) camera: PathBuf,
+    /// Which of its views
+    #[arg(long, value_name = "N", default_value = "0")]
+    pub(crate) view: usize,
+    /// Direction of the axis, about which the object turns right-handed: x, y, z, -x, -y, -z or X,Y,Z
+    #[arg(long, value_name = "AXIS", default_value = "z", value_parser = direction, allow_hyphen_values = true)]
+    pub(crate) axis: [f64; 3],
+    /// A point on the axis, in the units of the camera
+    #[arg(long, value_name = "X,Y,Z", default_value = "0,0,0", value_parser = vector, allow_hyphen_values = true)]
+    pub(crate) point: [f64; 3],
+    /// The table turned by this angle from photograph to photograph, in degrees
+    #[arg(long, value_name = "DEG", group = "turn", value_parser = step, allow_negative_numbers = true)]
+    pub(crate) step: Option<f64>,
+    /// A text file with the angle of each photograph in degrees, one a line
+    #[arg(long, value_name = "FILE", group = "turn")]
+    pub(crate) angles: Option<PathBuf>,
+}
+
 /// What the light is fixed to.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub(crate) enum LightArg {
@@ -601,6 +631,26 @@ fn axis(text: &str) -> Result<[f64; 3], String> {
     }
 }
 
+fn vector(text: &str) -> Result<[f64; 3], String> {
+    let numbers: Vec<f64> = text.split(',').filter_map(|word| word.trim().parse().ok()).collect();
+    match numbers.as_slice() {
+        &[x, y, z] if text.split(',').count() == 3 && [x, y, z].iter().all(|v| v.is_finite()) => Ok([x, y, z]),
+        _ => Err("needs three numbers, as in 0,0.1,-2".to_owned()),
+    }
+}
+
+fn direction(text: &str) -> Result<[f64; 3], String> {
+    let named_or_given = axis(text).or_else(|_| vector(text));
+    named_or_given
+        .ok()
+        .filter(|v| v.iter().any(|c| *c != 0.0))
+        .ok_or_else(|| "needs x, y, z, -x, -y, -z, or three numbers that are not all zero, as in 0,0.1,1".to_owned())
+}
+
+fn step(text: &str) -> Result<f64, String> {
+    within(text, -180.0, 180.0).and_then(|step| if step == 0.0 { Err("must not be 0".to_owned()) } else { Ok(step) })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -628,5 +678,10 @@ mod tests {
         assert_eq!(tolerance("1.25e-3"), Ok(0.00125));
         assert_eq!(length("30mm"), Ok(0.03));
         assert_eq!(axis("-y"), Ok([0.0, -1.0, 0.0]));
+        assert_eq!(direction("-1,0,2e-1"), Ok([-1.0, 0.0, 0.2]));
+        for text in ["0,0,0", "1,2", "1,2,3,4", "1,,2", "nan,0,1", "w"] {
+            assert!(direction(text).is_err(), "{text}");
+        }
+        assert!(step("0").is_err() && step("-10") == Ok(-10.0));
     }
 }

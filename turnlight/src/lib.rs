@@ -3,6 +3,7 @@
 //!
 //! - [`pipeline`]: views → hull → simplified mesh → atlas → appearance;
 //! - [`evaluate`]: the four methods on held-out views, as JSON, CSV and one HTML page;
+//! - [`colmap`]: cameras from an installed COLMAP, where there is no board;
 //! - [`film`]: films of every kind this build can write;
 //! - [`footage`]: from films and photographs to a capture;
 //! - [`footage_report`]: what became of footage, as a page;
@@ -11,6 +12,7 @@
 //! - [`stages`]: what each stage costs;
 //! - [`truth`]: a mesh held against the true one.
 
+pub mod colmap;
 mod error;
 pub mod evaluate;
 pub mod film;

@@ -63,6 +63,7 @@ fn run(cli: &Cli) -> Result<(), Error> {
         Command::Model(args) => commands::model::run(args, &progress),
         Command::Render(args) => commands::render::run(args, &progress),
         Command::Synth(args) => commands::synth::run(args, &progress),
+        Command::Turntable(args) => commands::turntable::run(args, &progress),
     }?;
     progress.finish();
     if cli.general.json {

@@ -238,6 +238,14 @@ fn nearest_rotation(matrix: Matrix3<f64>) -> Matrix3<f64> {
 const IMAGE_EXTENSIONS: [&str; 12] =
     ["png", "jpg", "jpeg", "ppm", "pgm", "pnm", "PNG", "JPG", "JPEG", "PPM", "PGM", "PNM"];
 
+/// The images in a folder, masks left out, in the order a person counts.
+pub(crate) fn images_in(folder: &Path) -> Result<Vec<PathBuf>, CaptureError> {
+    let is_dynamic_mask = |path: &Path| file_name(path).starts_with("dynamic_mask_");
+    let mut images: Vec<PathBuf> = list(folder)?.into_iter().filter(|p| is_image(p) && !is_dynamic_mask(p)).collect();
+    images.sort_by(|a, b| natural_order(&file_name(a), &file_name(b)));
+    Ok(images)
+}
+
 fn is_image(path: &Path) -> bool {
     let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
     let is_mask = path.file_stem().and_then(|s| s.to_str()).is_some_and(|s| s.ends_with(".mask"));

@@ -12,6 +12,7 @@ pub(crate) mod model;
 pub(crate) mod render;
 pub(crate) mod synth;
 mod synth_film;
+pub(crate) mod turntable;
 
 use crate::arguments::{CaptureArgs, FitArgs, MeshArgs, MethodArg, ShapeArgs};
 use std::path::Path;

@@ -7,6 +7,8 @@
 mod dome;
 mod page;
 mod plot;
+#[cfg(test)]
+mod tests;
 mod thumbnail;
 mod verdict;
 
