@@ -4,7 +4,7 @@ use super::bundle::{Fit, Freedom, settle};
 use super::clean::{Cleaned, upside_down};
 use super::homography::{constraint_ratio, fit_robust, median};
 use super::lens::LensPrior;
-use super::pose::{Candidate, candidates, choose, plane_of};
+use super::pose::{Candidate, candidates, choose, plane_near, plane_of};
 use super::rig::{Picture, Poses, Rig, Shape, Turning};
 use super::turntable::{
     axis, best_angle, canonical, divided, initial, largest_turn, likeliest_move, world_from_target,
@@ -36,6 +36,8 @@ const WORSE_PX: f64 = 0.5;
 const EXPLAINED: f64 = 0.6;
 /// Least turn that shows an axis, in radians.
 const LEAST_TURN: f64 = 0.05;
+/// Markers leave their plane if the noise falls to this part by it.
+const RELIEF: f64 = 0.8;
 /// Moves of the camera looked for.
 const MOST_MOVES: usize = 8;
 
@@ -96,6 +98,7 @@ pub(super) fn estimate(
         wanted => first.turning(wanted == Some(MotionKind::Turntable))?,
     };
     best.refine_lens();
+    best.find_relief();
     if let Poses::Turning(turning) = &best.rig.poses {
         let points = best.rig.shape.points();
         best.rig.poses = Poses::Turning(canonical(turning, &best.pictures, best.plane.as_ref(), &points));
@@ -125,7 +128,7 @@ fn shape_of(target: &Target, cleaned: &mut Cleaned) -> Result<(Shape, Vec<usize>
     }
     cleaned.indices = reached.iter().flat_map(|m| cleaned.indices[4 * m..4 * m + 4].to_vec()).collect();
     let fixed = reached.binary_search(&first).unwrap_or(0);
-    Ok((Shape::Squares { side, places: found.into_iter().flatten().collect(), fixed }, unreached))
+    Ok((Shape::Squares { side, places: found.into_iter().flatten().collect(), fixed, is_flat: true }, unreached))
 }
 
 fn opposite(points: &[Point3<f64>]) -> Result<Vec<usize>, CalibrateError> {
@@ -246,15 +249,8 @@ impl Estimate {
         let world = world_from_target(&axis, self.plane.as_ref(), &points);
         let reach = points.iter().map(|p| (p - axis.point).norm()).fold(0.0, f64::max);
         let turning = initial(&axis, world, poses, &self.pictures, self.rig.lens.fx, reach);
-        let mut tried = Self {
-            rig: Rig { poses: Poses::Turning(turning), ..self.rig.clone() },
-            pictures: self.pictures.clone(),
-            free: self.free.clone(),
-            prior: self.prior.clone(),
-            fit: self.fit.clone(),
-            unreached: self.unreached.clone(),
-            ..self
-        };
+        let mut tried = self.copy();
+        tried.rig.poses = Poses::Turning(turning);
         let is_good = tried.settle().is_ok() && {
             tried.find_moves();
             tried.fit.rms_px() <= (WORSE * self.fit.rms_px()).max(self.fit.rms_px() + WORSE_PX)
@@ -281,15 +277,8 @@ impl Estimate {
         for _ in 0..MOST_MOVES {
             let Poses::Turning(turning) = &self.rig.poses else { return };
             let Some((segment, at)) = likeliest_move(&self.rig, &self.pictures, self.noise()) else { return };
-            let mut next = Self {
-                rig: Rig { poses: Poses::Turning(divided(turning, &self.pictures, segment, at)), ..self.rig.clone() },
-                pictures: self.pictures.clone(),
-                free: self.free.clone(),
-                prior: self.prior.clone(),
-                fit: self.fit.clone(),
-                unreached: self.unreached.clone(),
-                ..*self
-            };
+            let mut next = self.copy();
+            next.rig.poses = Poses::Turning(divided(turning, &self.pictures, segment, at));
             next.pictures.iter_mut().for_each(|p| p.is_used = !p.corners.is_empty());
             if next.settle().is_err() {
                 return;
@@ -348,6 +337,37 @@ impl Estimate {
         };
         if !is_kept {
             (self.rig, self.pictures, self.fit, self.free) = before;
+        }
+    }
+
+    /// Lets learnt markers rise and tilt out of their plane if that explains much of the misfit: paper curls.
+    fn find_relief(&mut self) {
+        if !matches!(self.rig.shape, Shape::Squares { .. }) {
+            return;
+        }
+        let mut next = self.copy();
+        if let Shape::Squares { is_flat, .. } = &mut next.rig.shape {
+            *is_flat = false;
+        }
+        let is_better = next.settle().is_ok()
+            && next.used() >= self.used()
+            && next.fit.noise < RELIEF * self.fit.noise
+            && next.fit.corners as f64 > 0.95 * self.fit.corners as f64;
+        if is_better {
+            next.plane = plane_near(&next.rig.shape.points());
+            *self = next;
+        }
+    }
+
+    fn copy(&self) -> Self {
+        Self {
+            rig: self.rig.clone(),
+            pictures: self.pictures.clone(),
+            fit: self.fit.clone(),
+            free: self.free.clone(),
+            prior: self.prior.clone(),
+            unreached: self.unreached.clone(),
+            ..*self
         }
     }
 
