@@ -5,9 +5,9 @@ use super::clean::{Cleaned, upside_down};
 use super::homography::{constraint_ratio, fit_robust, median};
 use super::lens::LensPrior;
 use super::pose::{Candidate, candidates, choose, plane_near, plane_of};
-use super::rig::{Picture, Poses, Rig, Shape, Turning};
+use super::rig::{Corner, Picture, Poses, Rig, Shape, Turning};
 use super::turntable::{
-    axis, best_angle, canonical, divided, initial, largest_turn, likeliest_move, world_from_target,
+    axis, best_angle, canonical, divided, initial, joined, largest_turn, likeliest_move, world_from_target,
 };
 use super::{CalibrateError, CalibrateOptions, LensKnowledge, LensParameter, MotionKind, Source, Target, layout, lens};
 use crate::Intrinsics;
@@ -150,8 +150,7 @@ impl Flat<'_> {
     fn candidates(&self, lens: &Intrinsics, picture: &Picture, seed: usize) -> Vec<Candidate> {
         let mut found = candidates(lens, self.points, self.plane, &picture.corners, seed as u64);
         if let Some(opposite) = self.opposite {
-            let turned: Vec<_> =
-                picture.corners.iter().map(|c| super::rig::Corner { point: opposite[c.point], ..*c }).collect();
+            let turned: Vec<_> = picture.corners.iter().map(|c| Corner { point: opposite[c.point], ..*c }).collect();
             let more = candidates(lens, self.points, self.plane, &turned, seed as u64);
             found.extend(more.into_iter().map(|c| Candidate { is_turned: true, ..c }));
             found.sort_by(|a, b| a.rms_px.total_cmp(&b.rms_px));
@@ -205,7 +204,7 @@ fn free_poses(flat: &Flat, lens: &Intrinsics, mut pictures: Vec<Picture>) -> (Ve
 /// [`constraint_ratio`] of the pictures, their lens taken out as far as it is known.
 fn tilts(flat: &Flat, plane: &Isometry3<f64>, lens: &Intrinsics, pictures: &[Picture]) -> f64 {
     let map = |(k, picture): (usize, &Picture)| {
-        let pair = |c: &super::rig::Corner| {
+        let pair = |c: &Corner| {
             let from = plane.inverse_transform_point(&flat.points[c.point]).xy();
             Some((from, lens.undistort_pixel(c.pixel)?))
         };
@@ -226,10 +225,6 @@ impl Estimate {
 
     fn used(&self) -> usize {
         self.pictures.iter().filter(|p| p.is_used).count()
-    }
-
-    fn noise(&self) -> f64 {
-        self.fit.noise
     }
 
     /// The same pictures about one axis, or as they are if nothing says so.
@@ -253,6 +248,7 @@ impl Estimate {
         tried.rig.poses = Poses::Turning(turning);
         let is_good = tried.settle().is_ok() && {
             tried.find_moves();
+            tried.join_moves();
             tried.fit.rms_px() <= (WORSE * self.fit.rms_px()).max(self.fit.rms_px() + WORSE_PX)
                 && tried.used() as f64 >= EXPLAINED * self.used() as f64
         };
@@ -276,7 +272,7 @@ impl Estimate {
         self.rescue();
         for _ in 0..MOST_MOVES {
             let Poses::Turning(turning) = &self.rig.poses else { return };
-            let Some((segment, at)) = likeliest_move(&self.rig, &self.pictures, self.noise()) else { return };
+            let Some((segment, at)) = likeliest_move(&self.rig, &self.pictures, self.fit.noise) else { return };
             let mut next = self.copy();
             next.rig.poses = Poses::Turning(divided(turning, &self.pictures, segment, at));
             next.pictures.iter_mut().for_each(|p| p.is_used = !p.corners.is_empty());
@@ -292,6 +288,20 @@ impl Estimate {
         }
     }
 
+    /// Takes back moves of the camera that do not show.
+    fn join_moves(&mut self) {
+        for _ in 0..MOST_MOVES {
+            let Poses::Turning(turning) = &self.rig.poses else { return };
+            let Some(joined) = joined(&self.rig, turning, &self.pictures, self.fit.noise) else { return };
+            let mut next = self.copy();
+            next.rig.poses = Poses::Turning(joined);
+            if next.settle().is_err() || next.used() < self.used() {
+                return;
+            }
+            *self = next;
+        }
+    }
+
     /// Gives pictures that were left out another chance at the angle that fits best.
     fn rescue(&mut self) {
         let Poses::Turning(turning) = &self.rig.poses else { return };
@@ -299,7 +309,7 @@ impl Estimate {
         let mut has_changed = false;
         for (k, picture) in self.pictures.iter().enumerate().filter(|(_, p)| !p.is_used) {
             let found = best_angle(&self.rig, turning, picture, turning.segment_of[k]);
-            let Some((angle, _)) = found.filter(|(_, distance)| *distance < 3.0 * self.noise()) else { continue };
+            let Some((angle, _)) = found.filter(|(_, distance)| *distance < 3.0 * self.fit.noise) else { continue };
             next.angles[k] = angle;
             has_changed = true;
         }
