@@ -21,6 +21,9 @@ const LEAST_NOISE: f64 = 0.005;
 const OUT_OF_SIGHT: f64 = 1e4;
 /// Robust deviations beyond which a corner contradicts the others: one in three thousand by chance.
 const LIMIT: f64 = 4.0;
+/// What a marker that is not flat may tilt, in radians, and rise, in sides: paper that curls.
+const TILT: f64 = 0.2;
+const RISE: f64 = 0.3;
 /// Rounds of dropping what contradicts the rest.
 const ROUNDS: usize = 6;
 /// A picture contradicts the others if its RMS is so many times that of most, or ...
@@ -52,6 +55,25 @@ impl Fit {
     pub(super) fn rms_px(&self) -> f64 {
         (self.cost / self.corners.max(1) as f64).sqrt()
     }
+}
+
+/// Turns and moves of a marker: in its plane, or all.
+fn freedoms(is_flat: bool) -> &'static [usize] {
+    if is_flat { &[2, 3, 4] } else { &[0, 1, 2, 3, 4, 5] }
+}
+
+/// How far markers are out of their plane, in deviations of what paper does: freedom, value, one over the deviation.
+fn relief(shape: &Shape) -> Vec<(usize, [(usize, f64, f64); 3])> {
+    let Shape::Squares { side, places, fixed, is_flat: false } = shape else { return Vec::new() };
+    let of = |(n, place): (usize, &Isometry3<f64>)| {
+        let turn = place.rotation.scaled_axis();
+        let rise = 1.0 / (RISE * side);
+        (
+            n - usize::from(n > *fixed),
+            [(0, turn.x, 1.0 / TILT), (1, turn.y, 1.0 / TILT), (5, place.translation.z, rise)],
+        )
+    };
+    places.iter().enumerate().filter(|(n, _)| n != fixed).map(of).collect()
 }
 
 /// Where the parameters of the head are.
@@ -191,7 +213,7 @@ fn solve(rig: &mut Rig, pictures: &[Picture], freedom: Freedom, loss: Loss, nois
 /// Fit and information of the corners used.
 fn measure(rig: &Rig, pictures: &[Picture], freedom: Freedom) -> Option<Fit> {
     let head = Head::new(rig, freedom.lens);
-    let equations = equations_of(rig, pictures, Freedom { lens: freedom.lens, ..freedom }, &head, Loss::Square, 0.0);
+    let equations = equations_of(rig, pictures, freedom, &head, Loss::Square, 0.0);
     let used = pictures.iter().filter(|p| p.is_used);
     let corners = used.clone().map(|p| p.corners.iter().filter(|c| c.is_used).count()).sum::<usize>();
     let unknown = head.size + head.block * used.count();
@@ -256,7 +278,7 @@ impl<'a> Head<'a> {
         };
         let size = match &rig.shape {
             Shape::Points(_) => markers,
-            Shape::Squares { places, .. } => markers + 3 * (places.len() - 1),
+            Shape::Squares { places, is_flat, .. } => markers + freedoms(*is_flat).len() * (places.len() - 1),
         };
         Self { lens, axis, segments, markers, size, block }
     }
@@ -306,8 +328,15 @@ fn counting(picture: &Picture, loss: Loss) -> impl Iterator<Item = &Corner> {
     picture.corners.iter().filter(move |c| picture.is_used && (all || c.is_used))
 }
 
+/// Squared deviations from what is assumed.
+fn assumed(rig: &Rig, freedom: Freedom) -> f64 {
+    let relief = relief(&rig.shape).into_iter().flat_map(|(_, terms)| terms);
+    freedom.prior.cost(&rig.lens, freedom.lens)
+        + relief.map(|(_, value, precision)| (value * precision).powi(2)).sum::<f64>()
+}
+
 fn cost_of(rig: &Rig, pictures: &[Picture], freedom: Freedom, loss: Loss, noise: f64) -> f64 {
-    let mut cost = noise * noise * freedom.prior.cost(&rig.lens, freedom.lens);
+    let mut cost = noise * noise * assumed(rig, freedom);
     for (k, picture) in pictures.iter().enumerate() {
         let corners: Vec<Corner> = counting(picture, loss).copied().collect();
         for residual in rig.residuals(k, &corners) {
@@ -322,11 +351,18 @@ fn equations_of(rig: &Rig, pictures: &[Picture], freedom: Freedom, head: &Head, 
         head: DMatrix::zeros(head.size, head.size),
         gradient: DVector::zeros(head.size),
         blocks: Vec::with_capacity(pictures.len()),
-        cost: noise * noise * freedom.prior.cost(&rig.lens, freedom.lens),
+        cost: noise * noise * assumed(rig, freedom),
     };
     for (i, &parameter) in freedom.lens.iter().enumerate() {
         sum.head[(i, i)] += noise * noise * freedom.prior.precision(parameter);
         sum.gradient[i] += noise * noise * freedom.prior.pull(&rig.lens, parameter);
+    }
+    for (marker, terms) in relief(&rig.shape) {
+        for (freedom, value, precision) in terms {
+            let i = head.markers + 6 * marker + freedom;
+            sum.head[(i, i)] += (noise * precision).powi(2);
+            sum.gradient[i] -= (noise * precision).powi(2) * value;
+        }
     }
     let mut row = Vec::new();
     for (k, picture) in pictures.iter().enumerate() {
@@ -431,16 +467,15 @@ impl<'a> View<'a> {
             let column = if i < 3 { by_turn.column(i) } else { at.by_point.column(i - 3) };
             Vector2::new(column[0], column[1])
         });
-        if let Shape::Squares { side, places, fixed } = &self.rig.shape {
+        if let Shape::Squares { side, places, fixed, is_flat } = &self.rig.shape {
             let marker = corner.point / 4;
             if marker != *fixed {
-                let first = head.markers + 3 * (marker - usize::from(marker > *fixed));
+                let freedoms = freedoms(*is_flat);
+                let first = head.markers + freedoms.len() * (marker - usize::from(marker > *fixed));
                 let by_place = at.by_point * self.from_target;
-                let arm = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), places[marker].turn)
-                    * (*side * unit_corner(corner.point));
-                row.push((first, by_place * Vector3::x()));
-                row.push((first + 1, by_place * Vector3::y()));
-                row.push((first + 2, by_place * Vector3::z().cross(&arm)));
+                let arm = places[marker].rotation * (*side * unit_corner(corner.point));
+                let by = |i: usize| if i < 3 { Vector3::ith(i, 1.0).cross(&arm) } else { Vector3::ith(i - 3, 1.0) };
+                row.extend(freedoms.iter().enumerate().map(|(n, &i)| (first + n, by_place * by(i))));
             }
         }
         let residual = corner.pixel - at.pixel;
@@ -485,13 +520,13 @@ fn stepped(rig: &Rig, head: &Head, (first, rest): &(DVector<f64>, Vec<DVector<f6
             t.angles.iter_mut().zip(rest).for_each(|(angle, by)| *angle += by[0]);
         }
     }
-    if let Shape::Squares { places, fixed, .. } = &mut next.shape {
-        let mut i = head.markers;
-        for (_, place) in places.iter_mut().enumerate().filter(|(n, _)| *n != *fixed) {
-            place.x += at(i);
-            place.y += at(i + 1);
-            place.turn += at(i + 2);
-            i += 3;
+    if let Shape::Squares { places, fixed, is_flat, .. } = &mut next.shape {
+        let freedoms = freedoms(*is_flat);
+        for (n, place) in places.iter_mut().enumerate().filter(|(n, _)| n != fixed) {
+            let first_of = head.markers + freedoms.len() * (n - usize::from(n > *fixed));
+            let mut by = Vector6::zeros();
+            freedoms.iter().enumerate().for_each(|(k, &i)| by[i] = at(first_of + k));
+            *place = moved(place, &by);
         }
     }
     next

@@ -4,10 +4,10 @@ use super::bundle::{Fit, Freedom, settle};
 use super::clean::{Cleaned, upside_down};
 use super::homography::{constraint_ratio, fit_robust, median};
 use super::lens::LensPrior;
-use super::pose::{Candidate, candidates, choose, plane_of};
-use super::rig::{Picture, Poses, Rig, Shape, Turning};
+use super::pose::{Candidate, candidates, choose, plane_near, plane_of};
+use super::rig::{Corner, Picture, Poses, Rig, Shape, Turning};
 use super::turntable::{
-    axis, best_angle, canonical, divided, initial, largest_turn, likeliest_move, world_from_target,
+    axis, best_angle, canonical, divided, initial, joined, largest_turn, likeliest_move, world_from_target,
 };
 use super::{CalibrateError, CalibrateOptions, LensKnowledge, LensParameter, MotionKind, Source, Target, layout, lens};
 use crate::Intrinsics;
@@ -36,6 +36,8 @@ const WORSE_PX: f64 = 0.5;
 const EXPLAINED: f64 = 0.6;
 /// Least turn that shows an axis, in radians.
 const LEAST_TURN: f64 = 0.05;
+/// Markers leave their plane if the noise falls to this part by it.
+const RELIEF: f64 = 0.8;
 /// Moves of the camera looked for.
 const MOST_MOVES: usize = 8;
 
@@ -96,6 +98,7 @@ pub(super) fn estimate(
         wanted => first.turning(wanted == Some(MotionKind::Turntable))?,
     };
     best.refine_lens();
+    best.find_relief();
     if let Poses::Turning(turning) = &best.rig.poses {
         let points = best.rig.shape.points();
         best.rig.poses = Poses::Turning(canonical(turning, &best.pictures, best.plane.as_ref(), &points));
@@ -125,7 +128,7 @@ fn shape_of(target: &Target, cleaned: &mut Cleaned) -> Result<(Shape, Vec<usize>
     }
     cleaned.indices = reached.iter().flat_map(|m| cleaned.indices[4 * m..4 * m + 4].to_vec()).collect();
     let fixed = reached.binary_search(&first).unwrap_or(0);
-    Ok((Shape::Squares { side, places: found.into_iter().flatten().collect(), fixed }, unreached))
+    Ok((Shape::Squares { side, places: found.into_iter().flatten().collect(), fixed, is_flat: true }, unreached))
 }
 
 fn opposite(points: &[Point3<f64>]) -> Result<Vec<usize>, CalibrateError> {
@@ -147,8 +150,7 @@ impl Flat<'_> {
     fn candidates(&self, lens: &Intrinsics, picture: &Picture, seed: usize) -> Vec<Candidate> {
         let mut found = candidates(lens, self.points, self.plane, &picture.corners, seed as u64);
         if let Some(opposite) = self.opposite {
-            let turned: Vec<_> =
-                picture.corners.iter().map(|c| super::rig::Corner { point: opposite[c.point], ..*c }).collect();
+            let turned: Vec<_> = picture.corners.iter().map(|c| Corner { point: opposite[c.point], ..*c }).collect();
             let more = candidates(lens, self.points, self.plane, &turned, seed as u64);
             found.extend(more.into_iter().map(|c| Candidate { is_turned: true, ..c }));
             found.sort_by(|a, b| a.rms_px.total_cmp(&b.rms_px));
@@ -202,7 +204,7 @@ fn free_poses(flat: &Flat, lens: &Intrinsics, mut pictures: Vec<Picture>) -> (Ve
 /// [`constraint_ratio`] of the pictures, their lens taken out as far as it is known.
 fn tilts(flat: &Flat, plane: &Isometry3<f64>, lens: &Intrinsics, pictures: &[Picture]) -> f64 {
     let map = |(k, picture): (usize, &Picture)| {
-        let pair = |c: &super::rig::Corner| {
+        let pair = |c: &Corner| {
             let from = plane.inverse_transform_point(&flat.points[c.point]).xy();
             Some((from, lens.undistort_pixel(c.pixel)?))
         };
@@ -225,10 +227,6 @@ impl Estimate {
         self.pictures.iter().filter(|p| p.is_used).count()
     }
 
-    fn noise(&self) -> f64 {
-        self.fit.noise
-    }
-
     /// The same pictures about one axis, or as they are if nothing says so.
     fn turning(self, is_wanted: bool) -> Result<Self, CalibrateError> {
         let Poses::Free(poses) = &self.rig.poses else { return Ok(self) };
@@ -246,17 +244,11 @@ impl Estimate {
         let world = world_from_target(&axis, self.plane.as_ref(), &points);
         let reach = points.iter().map(|p| (p - axis.point).norm()).fold(0.0, f64::max);
         let turning = initial(&axis, world, poses, &self.pictures, self.rig.lens.fx, reach);
-        let mut tried = Self {
-            rig: Rig { poses: Poses::Turning(turning), ..self.rig.clone() },
-            pictures: self.pictures.clone(),
-            free: self.free.clone(),
-            prior: self.prior.clone(),
-            fit: self.fit.clone(),
-            unreached: self.unreached.clone(),
-            ..self
-        };
+        let mut tried = self.copy();
+        tried.rig.poses = Poses::Turning(turning);
         let is_good = tried.settle().is_ok() && {
             tried.find_moves();
+            tried.join_moves();
             tried.fit.rms_px() <= (WORSE * self.fit.rms_px()).max(self.fit.rms_px() + WORSE_PX)
                 && tried.used() as f64 >= EXPLAINED * self.used() as f64
         };
@@ -280,16 +272,9 @@ impl Estimate {
         self.rescue();
         for _ in 0..MOST_MOVES {
             let Poses::Turning(turning) = &self.rig.poses else { return };
-            let Some((segment, at)) = likeliest_move(&self.rig, &self.pictures, self.noise()) else { return };
-            let mut next = Self {
-                rig: Rig { poses: Poses::Turning(divided(turning, &self.pictures, segment, at)), ..self.rig.clone() },
-                pictures: self.pictures.clone(),
-                free: self.free.clone(),
-                prior: self.prior.clone(),
-                fit: self.fit.clone(),
-                unreached: self.unreached.clone(),
-                ..*self
-            };
+            let Some((segment, at)) = likeliest_move(&self.rig, &self.pictures, self.fit.noise) else { return };
+            let mut next = self.copy();
+            next.rig.poses = Poses::Turning(divided(turning, &self.pictures, segment, at));
             next.pictures.iter_mut().for_each(|p| p.is_used = !p.corners.is_empty());
             if next.settle().is_err() {
                 return;
@@ -303,6 +288,20 @@ impl Estimate {
         }
     }
 
+    /// Takes back moves of the camera that do not show.
+    fn join_moves(&mut self) {
+        for _ in 0..MOST_MOVES {
+            let Poses::Turning(turning) = &self.rig.poses else { return };
+            let Some(joined) = joined(&self.rig, turning, &self.pictures, self.fit.noise) else { return };
+            let mut next = self.copy();
+            next.rig.poses = Poses::Turning(joined);
+            if next.settle().is_err() || next.used() < self.used() {
+                return;
+            }
+            *self = next;
+        }
+    }
+
     /// Gives pictures that were left out another chance at the angle that fits best.
     fn rescue(&mut self) {
         let Poses::Turning(turning) = &self.rig.poses else { return };
@@ -310,7 +309,7 @@ impl Estimate {
         let mut has_changed = false;
         for (k, picture) in self.pictures.iter().enumerate().filter(|(_, p)| !p.is_used) {
             let found = best_angle(&self.rig, turning, picture, turning.segment_of[k]);
-            let Some((angle, _)) = found.filter(|(_, distance)| *distance < 3.0 * self.noise()) else { continue };
+            let Some((angle, _)) = found.filter(|(_, distance)| *distance < 3.0 * self.fit.noise) else { continue };
             next.angles[k] = angle;
             has_changed = true;
         }
@@ -348,6 +347,37 @@ impl Estimate {
         };
         if !is_kept {
             (self.rig, self.pictures, self.fit, self.free) = before;
+        }
+    }
+
+    /// Lets learnt markers rise and tilt out of their plane if that explains much of the misfit: paper curls.
+    fn find_relief(&mut self) {
+        if !matches!(self.rig.shape, Shape::Squares { .. }) {
+            return;
+        }
+        let mut next = self.copy();
+        if let Shape::Squares { is_flat, .. } = &mut next.rig.shape {
+            *is_flat = false;
+        }
+        let is_better = next.settle().is_ok()
+            && next.used() >= self.used()
+            && next.fit.noise < RELIEF * self.fit.noise
+            && next.fit.corners as f64 > 0.95 * self.fit.corners as f64;
+        if is_better {
+            next.plane = plane_near(&next.rig.shape.points());
+            *self = next;
+        }
+    }
+
+    fn copy(&self) -> Self {
+        Self {
+            rig: self.rig.clone(),
+            pictures: self.pictures.clone(),
+            fit: self.fit.clone(),
+            free: self.free.clone(),
+            prior: self.prior.clone(),
+            unreached: self.unreached.clone(),
+            ..*self
         }
     }
 

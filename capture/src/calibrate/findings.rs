@@ -3,6 +3,7 @@
 use super::clean::list;
 use super::estimate::Estimate;
 use super::homography::median;
+use super::rig::Shape;
 use super::{Calibration, LensParameter, LensReport, LensTerm, Motion, Sighting, Source, Standing, lens};
 use nalgebra::Point2;
 
@@ -54,6 +55,7 @@ pub(super) fn findings(estimate: &Estimate, result: &Calibration, sightings: &[S
     found.extend(motion_findings(estimate, result));
     found.extend(picture_findings(result));
     found.extend(cover(result, sightings));
+    found.extend(relief(estimate));
     if !estimate.unreached.is_empty() {
         let markers = list(&estimate.unreached);
         found.push(format!("Markers {markers} are never seen together with the others; they are left out."));
@@ -148,6 +150,16 @@ fn picture_findings(result: &Calibration) -> Vec<String> {
         found.push(format!("Pictures {} fit more than twice as badly as most.", list(&worse)));
     }
     found
+}
+
+/// How far learnt markers rise out of the plane nearest to them.
+fn relief(estimate: &Estimate) -> Option<String> {
+    let (Shape::Squares { is_flat: false, .. }, Some(plane)) = (&estimate.rig.shape, &estimate.plane) else {
+        return None;
+    };
+    let heights = estimate.rig.shape.points().into_iter().map(|p| plane.inverse_transform_point(&p).z.abs());
+    let most = 1000.0 * heights.fold(0.0, f64::max);
+    Some(format!("The markers are up to {most:.1} mm out of their plane, as paper that curls; taken into account."))
 }
 
 /// Whether corners reach over the picture, as distortion is only known where they are.

@@ -1,8 +1,8 @@
 //! A first guess of where square markers lie in their plane, from pictures of some of them at a time.
 
 use super::homography::{Pair, apply, fit_robust, median};
-use super::rig::{Picture, SquarePlace, unit_corner};
-use nalgebra::{Matrix3, Point2, Vector2};
+use super::rig::{Picture, flat_place, square_corner, unit_corner};
+use nalgebra::{Isometry3, Matrix3, Point2, Vector2, Vector3};
 
 /// A marker in a picture, all four corners of it.
 type Square = (usize, [Point2<f64>; 4]);
@@ -14,7 +14,7 @@ const ROUNDS: usize = 3;
 
 /// Places of `count` markers by way of the pictures that show two of them, beginning with the one seen most, which is
 /// told too and lies at the origin. `None` for those no chain leads to.
-pub(super) fn learn(pictures: &[Picture], count: usize, side: f64) -> (Vec<Option<SquarePlace>>, usize) {
+pub(super) fn learn(pictures: &[Picture], count: usize, side: f64) -> (Vec<Option<Isometry3<f64>>>, usize) {
     let squares: Vec<Vec<Square>> = pictures.iter().map(whole_markers).collect();
     let times = |marker: usize| squares.iter().flatten().filter(|(m, _)| *m == marker).count();
     let first = (0..count).max_by_key(|&m| (times(m), count - m)).unwrap_or(0);
@@ -22,7 +22,7 @@ pub(super) fn learn(pictures: &[Picture], count: usize, side: f64) -> (Vec<Optio
     if count == 0 {
         return (places, first);
     }
-    places[first] = Some(SquarePlace { x: 0.0, y: 0.0, turn: 0.0 });
+    places[first] = Some(Isometry3::identity());
     loop {
         let maps = maps(&squares, &places, side);
         // How often a marker is seen beside known ones.
@@ -63,12 +63,12 @@ fn whole_markers(picture: &Picture) -> Vec<Square> {
 }
 
 /// For each picture the map from the markers' plane to it, and how many known markers it is from.
-fn maps(squares: &[Vec<Square>], places: &[Option<SquarePlace>], side: f64) -> Vec<Map> {
+fn maps(squares: &[Vec<Square>], places: &[Option<Isometry3<f64>>], side: f64) -> Vec<Map> {
     let map = |(k, list): (usize, &Vec<Square>)| {
         let mut pairs: Vec<Pair> = Vec::new();
         for (marker, seen) in list {
             let Some(place) = places[*marker] else { continue };
-            pairs.extend((0..4).map(|c| (place.corner(side, c).xy(), seen[c])));
+            pairs.extend((0..4).map(|c| (square_corner(&place, side, c).xy(), seen[c])));
         }
         fit_robust(&pairs, k as u64).map(|(map, _)| (map, pairs.len() / 4))
     };
@@ -76,7 +76,7 @@ fn maps(squares: &[Vec<Square>], places: &[Option<SquarePlace>], side: f64) -> V
 }
 
 /// Where a marker lies by the pictures that show it with many known ones: medians.
-fn placed(squares: &[Vec<Square>], maps: &[Map], marker: usize, side: f64) -> Option<SquarePlace> {
+fn placed(squares: &[Vec<Square>], maps: &[Map], marker: usize, side: f64) -> Option<Isometry3<f64>> {
     let mut votes = Vec::new();
     for (list, map) in squares.iter().zip(maps) {
         let Some((map, known)) = map else { continue };
@@ -94,13 +94,14 @@ fn placed(squares: &[Vec<Square>], maps: &[Map], marker: usize, side: f64) -> Op
     }
     let most = votes.iter().map(|(_, known)| *known).max()?;
     votes.retain(|(_, known)| 2 * known >= most);
-    let of = |value: fn(&SquarePlace) -> f64| median(&votes.iter().map(|(p, _)| value(p)).collect::<Vec<_>>());
-    let [c, s] = [of(|p| p.turn.cos()), of(|p| p.turn.sin())];
-    Some(SquarePlace { x: of(|p| p.x), y: of(|p| p.y), turn: s.atan2(c) })
+    let of = |value: fn(&Isometry3<f64>) -> f64| median(&votes.iter().map(|(p, _)| value(p)).collect::<Vec<_>>());
+    // The side's direction rather than its angle, which jumps at half a turn.
+    let [c, s] = [of(|p| (p.rotation * Vector3::x()).x), of(|p| (p.rotation * Vector3::x()).y)];
+    Some(flat_place(of(|p| p.translation.x), of(|p| p.translation.y), s.atan2(c)))
 }
 
 /// The square nearest to four points, if they are about its size.
-fn square_at(corners: [Option<Point2<f64>>; 4], side: f64) -> Option<SquarePlace> {
+fn square_at(corners: [Option<Point2<f64>>; 4], side: f64) -> Option<Isometry3<f64>> {
     let [a, b, c, d] = corners;
     let corners = [a?, b?, c?, d?];
     let middle = corners.iter().map(|p| p.coords).sum::<Vector2<f64>>() / 4.0;
@@ -111,5 +112,5 @@ fn square_at(corners: [Option<Point2<f64>>; 4], side: f64) -> Option<SquarePlace
         cross += unit.perp(&arm);
     }
     let found = 0.5 * dot.hypot(cross);
-    (found > 0.3 * side && found < 3.0 * side).then(|| SquarePlace { x: middle.x, y: middle.y, turn: cross.atan2(dot) })
+    (found > 0.3 * side && found < 3.0 * side).then(|| flat_place(middle.x, middle.y, cross.atan2(dot)))
 }

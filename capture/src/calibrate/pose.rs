@@ -37,17 +37,21 @@ struct Seen {
     pixel: Point2<f64>,
 }
 
-/// The plane of points: from it to target coordinates; its z is the points' normal on the side of the target's z.
-/// `None` where they do not lie in a plane, to a hundredth of their extent.
+/// The plane of points, as [`plane_near`]; `None` where they do not lie in one, to a hundredth of their extent.
 pub(super) fn plane_of(points: &[Point3<f64>]) -> Option<Isometry3<f64>> {
+    let plane = plane_near(points)?;
+    let offsets = points.iter().map(|p| plane.inverse_transform_point(p).coords);
+    let (across, along) =
+        offsets.fold((0.0, 0.0), |(across, along), o| (across + o.z * o.z, along + o.xy().norm_squared()));
+    (across <= 1e-4 * along).then_some(plane)
+}
+
+/// The plane nearest to points: from it to target coordinates; its z is the normal on the side of the target's z.
+pub(super) fn plane_near(points: &[Point3<f64>]) -> Option<Isometry3<f64>> {
     let middle = points.iter().map(|p| p.coords).sum::<Vector3<f64>>() / points.len() as f64;
     let spread: Matrix3<f64> = points.iter().map(|p| (p.coords - middle) * (p.coords - middle).transpose()).sum();
     let eigen = SymmetricEigen::try_new(spread, 1e-15, 1000)?;
-    let (least, most) = (eigen.eigenvalues.imin(), eigen.eigenvalues.imax());
-    if eigen.eigenvalues[least].max(0.0) > 1e-4 * eigen.eigenvalues[most] {
-        return None;
-    }
-    let normal: Vector3<f64> = eigen.eigenvectors.column(least).into();
+    let normal: Vector3<f64> = eigen.eigenvectors.column(eigen.eigenvalues.imin()).into();
     let leading = normal.z + 1e-3 * normal.y + 1e-6 * normal.x;
     let normal = if leading < 0.0 { -normal } else { normal };
     let rotation = UnitQuaternion::rotation_between(&Vector3::z(), &normal)?;

@@ -33,16 +33,8 @@ pub(super) struct Picture {
 pub(super) enum Shape {
     /// Held.
     Points(Vec<Point3<f64>>),
-    /// Squares in the plane z = 0, four points each; marker `fixed` stays where it is.
-    Squares { side: f64, places: Vec<SquarePlace>, fixed: usize },
-}
-
-/// Where a square lies in the plane: its middle and its turn.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct SquarePlace {
-    pub(super) x: f64,
-    pub(super) y: f64,
-    pub(super) turn: f64,
+    /// Squares, four points each; marker `fixed` stays where it is. While they are flat all lie in the plane z = 0.
+    Squares { side: f64, places: Vec<Isometry3<f64>>, fixed: usize, is_flat: bool },
 }
 
 /// Where the camera was.
@@ -82,18 +74,21 @@ pub(super) fn unit_corner(k: usize) -> Vector3<f64> {
     [[-0.5, 0.5], [0.5, 0.5], [0.5, -0.5], [-0.5, -0.5]].map(|[x, y]| Vector3::new(x, y, 0.0))[k % 4]
 }
 
-impl SquarePlace {
-    pub(super) fn corner(&self, side: f64, k: usize) -> Point3<f64> {
-        let turned = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), self.turn) * (side * unit_corner(k));
-        Point3::new(self.x, self.y, 0.0) + turned
-    }
+/// Corner `k` of a square of this side somewhere.
+pub(super) fn square_corner(place: &Isometry3<f64>, side: f64, k: usize) -> Point3<f64> {
+    place * Point3::from(side * unit_corner(k))
+}
+
+/// A square's place in the plane z = 0.
+pub(super) fn flat_place(x: f64, y: f64, turn: f64) -> Isometry3<f64> {
+    Isometry3::new(Vector3::new(x, y, 0.0), turn * Vector3::z())
 }
 
 impl Shape {
     pub(super) fn point(&self, at: usize) -> Point3<f64> {
         match self {
             Self::Points(points) => points[at],
-            Self::Squares { side, places, .. } => places[at / 4].corner(*side, at % 4),
+            Self::Squares { side, places, .. } => square_corner(&places[at / 4], *side, at % 4),
         }
     }
 

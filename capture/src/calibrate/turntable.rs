@@ -2,8 +2,8 @@
 
 use super::homography::median;
 use super::pose::moved;
-use super::projection::linearise;
-use super::rig::{Picture, Poses, Rig, Shape, Turning, turned};
+use super::projection::{linearise, project};
+use super::rig::{Corner, Picture, Poses, Rig, Turning, turned};
 use nalgebra::{
     Isometry3, Matrix3, Matrix6, Point3, Rotation3, SymmetricEigen, Translation3, UnitQuaternion, Vector2, Vector3,
     Vector6,
@@ -310,6 +310,35 @@ pub(super) fn divided(turning: &Turning, pictures: &[Picture], segment: usize, a
     next.in_order()
 }
 
+/// The platter without a move of the camera that the corners do not show: one that shifts the target's points by less
+/// than their noise, in pixels. `None` if every move shows.
+pub(super) fn joined(rig: &Rig, turning: &Turning, pictures: &[Picture], noise: f64) -> Option<Turning> {
+    let film = |s: usize| turning.segment_of.iter().position(|&of| of == s).map(|k| pictures[k].film);
+    let points = rig.shape.points();
+    let shift = |s: usize, by: f64| {
+        let (a, b) = (turning.segments[s], turned(&turning.segments[s + 1], by));
+        let shift = |p: &Point3<f64>| {
+            let on_platter = turning.world_from_target * p;
+            let [a, b] = [a, b].map(|pose| project(&rig.lens, &(pose * on_platter).coords));
+            a.zip(b).map_or(f64::MAX.sqrt(), |(a, b)| (a - b).norm())
+        };
+        median(&points.iter().map(shift).collect::<Vec<_>>())
+    };
+    let turn = |s: usize| nearest_turn(&turning.segments[s], &turning.segments[s + 1]);
+    let hidden = |s: &usize| film(*s) == film(s + 1) && shift(*s, turn(*s)) < noise;
+    let s = (0..turning.segments.len().saturating_sub(1)).find(hidden)?;
+    let mut next = turning.clone();
+    for (k, of) in next.segment_of.iter_mut().enumerate() {
+        if *of == s + 1 {
+            next.angles[k] -= turn(s);
+        }
+        *of -= usize::from(*of > s);
+    }
+    next.segments.remove(s + 1);
+    next.references.remove(s + 1);
+    Some(next)
+}
+
 impl Turning {
     /// Segments numbered as their pictures come.
     fn in_order(self) -> Self {
@@ -335,9 +364,8 @@ pub(super) fn best_angle(rig: &Rig, turning: &Turning, picture: &Picture, segmen
     }
     let distance = |angle: f64| {
         let pose = turned(&turning.segments[segment], angle) * turning.world_from_target;
-        let single = Rig { lens: rig.lens, shape: Shape::Points(Vec::new()), poses: Poses::Free(vec![pose]) };
-        let away = |c: &super::rig::Corner| {
-            let seen = super::projection::project(&single.lens, &(pose * rig.shape.point(c.point)).coords);
+        let away = |c: &Corner| {
+            let seen = project(&rig.lens, &(pose * rig.shape.point(c.point)).coords);
             seen.map_or(f64::MAX.sqrt(), |seen| (seen - c.pixel).norm())
         };
         median(&picture.corners.iter().map(away).collect::<Vec<_>>())

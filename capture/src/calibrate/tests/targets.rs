@@ -91,12 +91,8 @@ fn strewn(ids: &[usize]) -> Vec<(usize, Point3<f64>)> {
     let mut points = Vec::new();
     for (n, id) in ids.iter().enumerate() {
         let (x, y) = (0.06 * (n % 4) as f64, 0.06 * (n / 4) as f64);
-        let place = rig::SquarePlace {
-            x: x + 0.02 * chance.uniform(),
-            y: y + 0.02 * chance.uniform(),
-            turn: TAU * chance.uniform(),
-        };
-        points.extend((0..4).map(|k| (4 * id + k, place.corner(0.025, k))));
+        let place = rig::flat_place(x + 0.02 * chance.uniform(), y + 0.02 * chance.uniform(), TAU * chance.uniform());
+        points.extend((0..4).map(|k| (4 * id + k, rig::square_corner(&place, 0.025, k))));
     }
     points
 }
@@ -118,10 +114,9 @@ fn marker_sightings(film: &Film, layout: &[(usize, Point3<f64>)], seed: u64) -> 
 fn layout_error(result: &Calibration, truth: &[(usize, Point3<f64>)]) -> f64 {
     let learnt = |index: usize| result.points.iter().find(|(i, _)| *i == index).unwrap().1;
     let pairs: Vec<(Point3<f64>, Point3<f64>)> = truth.iter().map(|&(i, p)| (learnt(i), p)).collect();
-    let mean = |of: fn(&(Point3<f64>, Point3<f64>)) -> Vector3<f64>| {
-        pairs.iter().map(of).sum::<Vector3<f64>>() / pairs.len() as f64
-    };
-    let (from, to) = (mean(|p| p.0.coords), mean(|p| p.1.coords));
+    let n = pairs.len() as f64;
+    let from = pairs.iter().map(|p| p.0.coords).sum::<Vector3<f64>>() / n;
+    let to = pairs.iter().map(|p| p.1.coords).sum::<Vector3<f64>>() / n;
     let (mut dot, mut cross) = (0.0, 0.0);
     for (a, b) in &pairs {
         let (a, b) = ((a.coords - from).xy(), (b.coords - to).xy());
@@ -160,4 +155,25 @@ fn markers_never_seen_with_the_others_are_named() {
     let result = calibrate(&Target::Markers { side: 0.025 }, &sightings, &known()).unwrap();
     assert!(result.findings.iter().any(|f| f.contains("Markers 5 are never seen together")), "{:?}", result.findings);
     assert_eq!(result.points.len(), 20);
+}
+
+#[test]
+fn markers_on_paper_that_curls_leave_its_plane() {
+    let mut layout = strewn(&(0..16).collect::<Vec<_>>());
+    // Rolled about y, by a radius of 0.4 m.
+    for (_, p) in &mut layout {
+        let turn = p.x / 0.4;
+        *p = Point3::new(0.4 * turn.sin(), p.y, 0.4 * (1.0 - turn.cos()));
+    }
+    let film = Film { axis: (Point3::new(0.1, 0.09, 0.02), Vector3::z()), ..Film::flat(35.0, 30) };
+    let film = Film { camera: look(35.0, 0.5, film.axis.0, 0.0), ..film };
+    let sightings = marker_sightings(&film, &layout, 77);
+    let result = calibrate(&Target::Markers { side: 0.025 }, &sightings, &known()).unwrap();
+    assert!(result.rms_px < 0.3, "{} {:?}", result.rms_px, result.findings);
+    assert!(result.findings.iter().any(|f| f.contains("out of their plane")), "{:?}", result.findings);
+    // The axis of the film in the world is the world's.
+    assert!(angle_error_deg(&result, &film.angles) < 0.02);
+    let flat = marker_sightings(&film, &strewn(&(0..16).collect::<Vec<_>>()), 77);
+    let result = calibrate(&Target::Markers { side: 0.025 }, &flat, &known()).unwrap();
+    assert!(result.points.iter().all(|(_, p)| p.z == 0.0));
 }
