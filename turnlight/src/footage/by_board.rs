@@ -173,6 +173,8 @@ fn lens_note(lens: &Intrinsics, rms_px: f64) -> String {
 
 fn target(pattern: &Pattern, options: &FootageOptions) -> Target {
     match pattern {
+        // Printed at home, on paper that curls: where its markers lie is better learnt than believed.
+        Pattern::Board(Board::ArucoGrid { marker, .. }) => Target::Markers { side: *marker },
         Pattern::Board(board) => Target::Points(board.corners()),
         Pattern::Markers(_) => Target::Markers { side: options.length.unwrap_or(1.0) },
     }

@@ -6,6 +6,9 @@ use capture::choose::{Choice, ChooseOptions, DropReason, Dropped, FilmFrame, Vie
 /// Standpoints whose heights above the table differ by less see the same ring, radians.
 const SAME_HEIGHT: f64 = 0.06;
 
+/// Photographs nearer to one another than this show the same, degrees.
+const PHOTOGRAPH_STEP_DEG: f64 = 0.5;
+
 /// The frames chosen.
 #[derive(Clone, Debug, Default)]
 pub struct Selected {
@@ -17,10 +20,17 @@ pub struct Selected {
     pub rings: Vec<Choice>,
 }
 
-/// Chooses frames for every height of the camera, and puts the choices together.
+/// Chooses frames for every height of the camera, and puts the choices together. Whoever took photographs has chosen:
+/// of them all are kept that show another side.
 pub(super) fn select(shots: &Shots, options: &FootageOptions) -> Selected {
     let groups = heights(shots);
-    let usual = ChooseOptions::default();
+    let is_film = shots.shots.iter().any(|shot| shot.source.file.is_none());
+    let of_film = ChooseOptions::default();
+    let usual = if is_film {
+        of_film
+    } else {
+        ChooseOptions { most: shots.shots.len(), min_step_deg: PHOTOGRAPH_STEP_DEG, ..of_film }
+    };
     let most = (options.most.unwrap_or(usual.most * groups.len()) / groups.len()).max(1);
     let mut selected = Selected::default();
     for members in &groups {
