@@ -39,7 +39,7 @@ fn check_replaceable(dir: &Path) -> Result<(), CaptureError> {
     if !dir.exists() {
         return Ok(());
     }
-    let ours = ["transforms.json", "images", "masks"];
+    let ours = ["transforms.json", "images", "masks", "report.html", "report.json"];
     let foreign = |e: fs::DirEntry| !ours.contains(&e.file_name().to_string_lossy().as_ref());
     let mut entries = fs::read_dir(dir).map_err(|e| CaptureError::io(dir, e))?;
     if entries.any(|entry| entry.map_or(true, foreign)) {
