@@ -39,7 +39,7 @@ pub struct ShadingSample {
 pub enum ShadedSurface {
     /// The platter or the board: level, so that far light shades it alike at every angle.
     Level,
-    /// The object, with points that face all sides.
+    /// The object, with points that face all sides (level ones left out).
     AllAround,
 }
 
@@ -172,10 +172,12 @@ const MIN_SAMPLES: usize = 6;
 const MIN_POINTS: usize = 8;
 /// Matt surfaces under lamps of a room follow the turn by at least this much, seen from all sides…
 const ROOM_AROUND: f64 = 0.06;
-/// …and level ones, where lamps are near, by this much.
+/// …and level ones, where lamps are near, by this much…
 const ROOM_LEVEL: f64 = 0.03;
+/// …and by this many times what else changes them: texture that slides under the points does both.
+const ROOM_RATIO: f64 = 1.3;
 /// Light that turns along leaves less than this.
-const OBJECT: f64 = 0.03;
+const OBJECT: f64 = 0.025;
 /// Rounds in which levels of points and gains of frames are found.
 const EVENING_ROUNDS: usize = 30;
 /// Least determinant of the mean normal matrix of `(1, cos θ, sin θ)`, that of 30°: shorter arcs fix no harmonic.
@@ -191,9 +193,9 @@ pub fn judge_light(samples: &[ShadingSample], surface: ShadedSurface) -> LightCh
     let (modulation, residual) = (middle(0), middle(1));
     let kind = match surface {
         _ if fits.len() < MIN_POINTS => LightKind::Undetermined,
-        ShadedSurface::AllAround if modulation > ROOM_AROUND && modulation > residual => LightKind::Room,
+        ShadedSurface::AllAround if modulation > ROOM_AROUND && modulation > ROOM_RATIO * residual => LightKind::Room,
         ShadedSurface::AllAround if modulation < OBJECT => LightKind::Object,
-        ShadedSurface::Level if modulation > ROOM_LEVEL && modulation > residual => LightKind::Room,
+        ShadedSurface::Level if modulation > ROOM_LEVEL && modulation > ROOM_RATIO * residual => LightKind::Room,
         _ => LightKind::Undetermined,
     };
     LightCheck { kind, modulation, residual, points: fits.len() }

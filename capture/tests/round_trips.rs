@@ -85,9 +85,11 @@ fn a_written_capture_comes_back() {
     let dir = tempfile::tempdir().unwrap();
     let capture = example(dir.path());
     let out = dir.path().join("deep/owl");
-    // The second write replaces the first.
+    // The second write replaces the first, with the report beside it.
     capture.write(&out).unwrap();
+    std::fs::write(out.join("report.html"), "<!doctype html>").unwrap();
     capture.write(&out).unwrap();
+    assert!(!out.join("report.html").exists());
     let back = Capture::read(&out).unwrap();
     assert_eq!((back.aabb, back.unit, back.mask_source), (capture.aabb, capture.unit, MaskSource::MaskPath));
     for (a, b) in capture.frames.iter().zip(&back.frames) {

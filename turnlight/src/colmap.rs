@@ -4,7 +4,7 @@
 
 use crate::Error;
 use crate::stages::Stages;
-use capture::{Camera, Capture, Image, write_matte};
+use capture::{Camera, Capture, Image, Intrinsics, write_matte};
 use std::fs;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
@@ -15,8 +15,12 @@ use std::process::{Command, Output};
 pub struct ColmapOptions {
     /// The program, by name or path.
     pub program: PathBuf,
-    /// Whether neighbours in the list are neighbours in space: matches those only, and ends with beginnings.
+    /// Whether neighbours in the list are neighbours in space, as in a film that goes around: matches only those, and the
+    /// end with the beginning. Otherwise all pairs, which takes about a second each.
     pub is_film: bool,
+    /// The lens, where it is known; otherwise one focal length and one coefficient of distortion are sought, with the
+    /// principal point in the middle. More cannot be told on one ring of cameras.
+    pub lens: Option<Intrinsics>,
 }
 
 /// A photograph whose camera is wanted.
@@ -37,14 +41,14 @@ pub struct ColmapCameras {
     pub models: usize,
 }
 
-/// Longer films are matched with their neighbours only: all pairs of this many take half an hour.
-pub const MAX_EXHAUSTIVE: usize = 150;
+/// Frames of a film are matched with this many that follow.
+const REACH: usize = 8;
 /// Lines of COLMAP's last words that a fault shows.
 const LAST_WORDS: usize = 3;
 
 impl Default for ColmapOptions {
     fn default() -> Self {
-        Self { program: PathBuf::from("colmap"), is_film: false }
+        Self { program: PathBuf::from("colmap"), is_film: false, lens: None }
     }
 }
 
@@ -57,14 +61,14 @@ pub fn find_cameras(
     options: &ColmapOptions,
     stages: &mut Stages<'_>,
 ) -> Result<ColmapCameras, Error> {
-    let help = run(options, "help", &[])?;
-    drop(help);
+    // Before any work: whether it is there.
+    run(options, "help", &[])?;
     let place = tempfile::Builder::new().prefix("turnlight-colmap-").tempdir();
     let place = place.map_err(|fault| Error::Failed(format!("no temporary folder: {fault}; set TMPDIR to another")))?;
     let place = place.path();
     let names = stage(photographs, place)?;
     stages.run("find features", |_| extract(options, place))?;
-    stages.run("match features", |_| match_features(options, place, photographs.len()))?;
+    stages.run("match features", |_| match_features(options, place, &names))?;
     stages.run("find cameras", |_| map(options, place))?;
     largest_model(&place.join("sparse"), &names)
 }
@@ -96,7 +100,12 @@ fn stage(photographs: &[Photograph], place: &Path) -> Result<Vec<String>, Error>
 fn extract(options: &ColmapOptions, place: &Path) -> Result<(), Error> {
     let [database, images, masks] = ["database.db", "images", "masks"].map(|name| text(&place.join(name)));
     let mut arguments = vec!["--database_path", &database, "--image_path", &images];
-    arguments.extend(["--ImageReader.single_camera", "1", "--ImageReader.camera_model", "OPENCV"]);
+    let (model, parameters) =
+        options.lens.as_ref().map_or(("SIMPLE_RADIAL", None), |lens| ("FULL_OPENCV", Some(parameters(lens))));
+    arguments.extend(["--ImageReader.single_camera", "1", "--ImageReader.camera_model", model]);
+    if let Some(parameters) = &parameters {
+        arguments.extend(["--ImageReader.camera_params", parameters]);
+    }
     if fs::read_dir(place.join("masks")).is_ok_and(|mut found| found.next().is_some()) {
         arguments.extend(["--ImageReader.mask_path", &masks]);
     }
@@ -106,20 +115,42 @@ fn extract(options: &ColmapOptions, place: &Path) -> Result<(), Error> {
     run(options, "feature_extractor", &arguments).map(|_| ())
 }
 
-fn match_features(options: &ColmapOptions, place: &Path, photographs: usize) -> Result<(), Error> {
-    let database = text(&place.join("database.db"));
-    let is_film = options.is_film && photographs > MAX_EXHAUSTIVE;
-    let command = if is_film { "sequential_matcher" } else { "exhaustive_matcher" };
+/// A lens as COLMAP's `FULL_OPENCV`: fx, fy, cx, cy, k1, k2, p1, p2, k3 and three that are not ours.
+fn parameters(lens: &Intrinsics) -> String {
+    let d = lens.distortion;
+    let all = [lens.fx, lens.fy, lens.cx, lens.cy, d.k1, d.k2, d.p1, d.p2, d.k3, 0.0, 0.0, 0.0];
+    all.map(|v| v.to_string()).join(",")
+}
+
+fn match_features(options: &ColmapOptions, place: &Path, names: &[String]) -> Result<(), Error> {
+    let [database, pairs] = ["database.db", "pairs.txt"].map(|name| text(&place.join(name)));
+    let command = if options.is_film { "matches_importer" } else { "exhaustive_matcher" };
     let known = run(options, command, &["-h"])?;
     let mut arguments = vec!["--database_path", &database];
+    if options.is_film {
+        fs::write(&pairs, neighbours(names)).map_err(|fault| cannot(Path::new(&pairs), &fault))?;
+        arguments.extend(["--match_list_path", &pairs, "--match_type", "pairs"]);
+    }
     arguments.extend(first_known(&known, &["--FeatureMatching.use_gpu", "--SiftMatching.use_gpu"], "0"));
     run(options, command, &arguments).map(|_| ())
 }
 
+/// Each name with those that follow, around the end, one pair a line.
+fn neighbours(names: &[String]) -> String {
+    let n = names.len();
+    // Where all are neighbours, each pair once.
+    let is_new = |i: usize, ahead: usize| 2 * ahead < n || (2 * ahead == n && i < ahead);
+    let pairs = (0..n).flat_map(|i| (1..=REACH).filter(move |&ahead| is_new(i, ahead)).map(move |ahead| (i, ahead)));
+    pairs.map(|(i, ahead)| format!("{} {}\n", names[i], names[(i + ahead) % n])).collect()
+}
+
 fn map(options: &ColmapOptions, place: &Path) -> Result<(), Error> {
     let [database, images, sparse] = ["database.db", "images", "sparse"].map(|name| text(&place.join(name)));
-    run(options, "mapper", &["--database_path", &database, "--image_path", &images, "--output_path", &sparse])
-        .map(|_| ())
+    let mut arguments = vec!["--database_path", &database, "--image_path", &images, "--output_path", &sparse];
+    if options.lens.is_some() {
+        arguments.extend(["--Mapper.ba_refine_focal_length", "0", "--Mapper.ba_refine_extra_params", "0"]);
+    }
+    run(options, "mapper", &arguments).map(|_| ())
 }
 
 /// The first of the options that this version's help names, with its value.
@@ -198,6 +229,7 @@ fn cannot(path: &Path, fault: &std::io::Error) -> Error {
 mod tests {
     use super::*;
     use crate::stages::Silent;
+    use capture::Distortion;
     use std::os::unix::fs::PermissionsExt;
 
     /// A program in the place of COLMAP that writes down how it was called, and does what `mapper` says.
@@ -212,7 +244,7 @@ mod tests {
         );
         fs::write(&program, script).unwrap();
         fs::set_permissions(&program, fs::Permissions::from_mode(0o755)).unwrap();
-        ColmapOptions { program, is_film: false }
+        ColmapOptions { program, ..ColmapOptions::default() }
     }
 
     const MODEL: &str = "printf '1 PINHOLE 8 6 9 9 4 3\\n' > $out/$m/cameras.txt";
@@ -251,6 +283,27 @@ mod tests {
     }
 
     #[test]
+    fn films_are_matched_with_their_neighbours_and_around_the_end() {
+        let names = |n: usize| (0..n).map(|i| i.to_string()).collect::<Vec<_>>();
+        let pairs = |n| neighbours(&names(n)).lines().count();
+        assert_eq!([0, 1, 2, 3, 4, 5, 16, 72].map(pairs), [0, 0, 1, 3, 6, 10, 120, 576]);
+        assert!(neighbours(&names(72)).contains("71 7\n"));
+    }
+
+    #[test]
+    fn a_known_lens_is_given_and_left_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        let distortion = Distortion { k1: -0.06, k3: 0.001, ..Distortion::default() };
+        let lens = Intrinsics { fx: 9.5, fy: 9.0, skew: 0.0, cx: 4.0, cy: 3.0, distortion, width: 8, height: 6 };
+        let options = ColmapOptions { lens: Some(lens), ..fake(folder.path(), "true") };
+        let none = find_cameras(&photographs(folder.path(), 2), &options, &mut Stages::new(&Silent));
+        assert!(none.is_err());
+        let log = fs::read_to_string(folder.path().join("log")).unwrap();
+        assert!(log.contains("FULL_OPENCV --ImageReader.camera_params 9.5,9,4,3,-0.06,0,0,0,0.001,0,0,0"), "{log}");
+        assert!(log.contains("--Mapper.ba_refine_focal_length 0"), "{log}");
+    }
+
+    #[test]
     fn no_model_says_what_to_film() {
         let (found, _) = find("true");
         let fault = found.unwrap_err();
@@ -266,7 +319,7 @@ mod tests {
 
     #[test]
     fn without_colmap_the_remedy_is_named() {
-        let options = ColmapOptions { program: PathBuf::from("/none/colmap"), is_film: false };
+        let options = ColmapOptions { program: PathBuf::from("/none/colmap"), ..ColmapOptions::default() };
         let fault = find_cameras(&[], &options, &mut Stages::new(&Silent)).unwrap_err().to_string();
         assert!(fault.contains("not installed") && fault.contains("apt-get install colmap"), "{fault}");
     }

@@ -9,6 +9,7 @@
 //! - [`footage_report`]: what became of footage, as a page;
 //! - [`inspect`]: what a mesh, a model or a capture holds;
 //! - [`output`]: files and folders that appear whole or not at all;
+//! - [`shading`]: how the object is lit over a turn;
 //! - [`stages`]: what each stage costs;
 //! - [`truth`]: a mesh held against the true one.
 
@@ -23,6 +24,7 @@ pub mod output;
 pub mod pipeline;
 pub mod playback;
 mod selection;
+pub mod shading;
 pub mod stages;
 pub mod truth;
 

@@ -60,14 +60,17 @@ fn report() -> FootageReport {
     }
 }
 
-fn thumbnail(overlay: &Overlay) -> Thumbnail {
+fn camera() -> Camera {
     let distortion = Distortion::default();
     let intrinsics =
         Intrinsics { fx: 800.0, fy: 800.0, skew: 0.0, cx: 320.0, cy: 240.0, distortion, width: 640, height: 480 };
-    let camera = Camera { intrinsics, rotation: Matrix3::identity(), translation: Vector3::new(0.0, 0.0, 2.0) };
+    Camera { intrinsics, rotation: Matrix3::identity(), translation: Vector3::new(0.0, 0.0, 2.0) }
+}
+
+fn thumbnail(overlay: &Overlay) -> Thumbnail {
     let mut matte = Image::filled(640, 480, 0);
     (200..280).for_each(|y| (280..360).for_each(|x| matte.set(x, y, 255)));
-    Thumbnail::new(&Image::filled(640, 480, [90, 120, 60]), &matte, &camera, overlay).unwrap()
+    Thumbnail::new(&Image::filled(640, 480, [90, 120, 60]), &matte, &camera(), overlay).unwrap()
 }
 
 fn overlay() -> Overlay {
@@ -121,6 +124,9 @@ fn the_outline_and_the_box_lie_where_the_camera_sees_them() {
     assert!(outline.starts_with("M140") && outline.len() < 120, "{outline}");
     // x runs from the middle to the right: 0.1 units at 2 with f = 800 are 40 pixels, 20 here.
     assert!(picture.contains("class=\"axis x\" d=\"M160 120"), "{picture}");
+    // Cut to the box, 0.1 units at 1.9 or 42.1 pixels and 12.6 of room to each side, nothing is reduced.
+    let cut = thumbnail(&overlay().cut_to_box([&camera()])).html("a");
+    assert!(cut.contains("width=\"110\" height=\"110\"") && cut.contains("class=\"axis x\" d=\"M55 55"), "{cut}");
     let behind = Overlay { origin: Point3::new(0.0, 0.0, -5.0), ..overlay() };
     assert!(thumbnail(&behind).html("a").contains("class=\"axis x\" d=\"\""));
 }
