@@ -99,8 +99,7 @@ pub(super) fn search_box(setup: &StageSetup) -> Option<Aabb> {
 
 /// A cube about the point nearest to all optical axes, as large as the narrowest view of it.
 fn looked_at(setup: &StageSetup) -> Option<Aabb> {
-    let axes: Vec<Ray> =
-        setup.cameras.iter().map(|c| Ray { origin: c.center(), direction: c.forward() }).collect();
+    let axes: Vec<Ray> = setup.cameras.iter().map(|c| Ray { origin: c.center(), direction: c.forward() }).collect();
     let center = nearest_to_rays(&axes).or_else(|| on_target(setup, &axes))?;
     let radius = |c: &Camera| {
         let depth = c.project(&center)?.depth;
