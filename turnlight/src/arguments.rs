@@ -212,6 +212,9 @@ pub(crate) struct CaptureFootageArgs {
     /// Take the cameras of photographs from this calibrated folder of any known kind, by name
     #[arg(long, value_name = "CAPTURE")]
     pub(crate) cameras: Option<PathBuf>,
+    /// Have an installed COLMAP find the cameras of photographs, without a board; give masks where the object turned
+    #[arg(long, value_name = "PROGRAM", num_args = 0..=1, default_missing_value = "colmap", conflicts_with_all = ["cameras", "board", "square", "calibration", "motion"])]
+    pub(crate) colmap: Option<PathBuf>,
     /// Take silhouettes from this folder: NAME.png of a photograph, the frame's number of a film
     #[arg(long, value_name = "DIR", conflicts_with = "clean_plate")]
     pub(crate) masks: Option<PathBuf>,

@@ -63,7 +63,11 @@ fn options(args: &CaptureFootageArgs) -> Result<FootageOptions, Error> {
             MotionArg::Turntable => MotionKind::Turntable,
             MotionArg::FreeHand => MotionKind::FreeHand,
         }),
-        cameras: args.cameras.clone().map_or(CameraSource::Board, CameraSource::Calibrated),
+        cameras: match (&args.cameras, &args.colmap) {
+            (Some(path), _) => CameraSource::Calibrated(path.clone()),
+            (None, Some(program)) => CameraSource::Colmap(program.clone()),
+            (None, None) => CameraSource::Board,
+        },
         masks: args.masks.clone(),
         clean_plates: args.clean_plate.clone(),
         light_ball: args.light_ball,

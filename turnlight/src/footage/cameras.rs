@@ -2,9 +2,10 @@
 
 use super::{FootageOptions, Shot, Shots};
 use crate::Error;
+use crate::colmap::{self, ColmapOptions, Photograph};
 use crate::stages::Stages;
 use capture::choose::{self, PoseSource};
-use capture::footage::{Footage, FrameSource};
+use capture::footage::{Footage, FrameSource, read_upright};
 use capture::{Camera, Capture};
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
@@ -17,6 +18,8 @@ pub enum CameraSource {
     Board,
     /// A calibrated folder of any known kind, whose frames have the names of the photographs.
     Calibrated(PathBuf),
+    /// An installed COLMAP, by name or path, on the photographs and the masks given with them.
+    Colmap(PathBuf),
 }
 
 /// Finds the frames of the footage and their cameras.
@@ -31,6 +34,7 @@ pub(super) fn find_cameras(
     match &options.cameras {
         CameraSource::Board => by_board(footage, options, stages),
         CameraSource::Calibrated(path) => calibrated(footage, path, stages),
+        CameraSource::Colmap(program) => by_colmap(footage, program, options, stages),
     }
 }
 
@@ -52,21 +56,58 @@ fn calibrated(footage: &Footage, path: &Path, stages: &mut Stages<'_>) -> Result
     let capture = Capture::read(path)?;
     let sources = photographs(footage)?;
     let cameras = sources.iter().map(|source| camera_of(source, &capture, path)).collect::<Result<Vec<_>, _>>()?;
-    let sharpness = stages.run("look", |_| {
-        let look = |source: &FrameSource| match &source.file {
-            Some(file) => Ok(choose::sharpness(&capture::footage::read_upright(file)?)),
-            None => Ok(0.0),
-        };
-        sources.par_iter().map(look).collect::<Vec<Result<f64, Error>>>()
-    });
+    let cameras = cameras.into_iter().map(Some).collect();
+    let shots = photographed(sources, cameras, format!("cameras of {}", path.display()), stages)?;
+    Ok(Shots { unit: capture.unit, ..shots })
+}
+
+/// Photographs whose cameras COLMAP finds. What stands still while the object turns has to be masked.
+fn by_colmap(
+    footage: &Footage,
+    program: &Path,
+    options: &FootageOptions,
+    stages: &mut Stages<'_>,
+) -> Result<Shots, Error> {
+    let sources = photographs(footage)?;
+    if options.masks.is_none() {
+        let note = "no masks: COLMAP sees the room, which is right only if the camera was carried (otherwise --masks)";
+        stages.observer().noted(note);
+    }
+    let photograph = |source: &FrameSource| {
+        let matte = options.masks.as_ref().map(|folder| super::silhouettes::given(folder, source)).transpose()?;
+        Ok(Photograph { image: source.file.clone().unwrap_or_default(), matte })
+    };
+    let pictures = sources.iter().map(photograph).collect::<Result<Vec<_>, Error>>()?;
+    let colmap = ColmapOptions { program: program.to_owned(), ..ColmapOptions::default() };
+    let found = colmap::find_cameras(&pictures, &colmap, stages)?;
+    let mut shots = photographed(sources, found.cameras, "COLMAP".to_owned(), stages)?;
+    if found.models > 1 {
+        let fault = format!("the photographs fell apart into {} groups, of which the largest is used", found.models);
+        shots.findings.push(format!("{fault}: take more between them"));
+    }
+    Ok(shots)
+}
+
+fn photographed(
+    sources: Vec<FrameSource>,
+    cameras: Vec<Option<Camera>>,
+    told_by: String,
+    stages: &mut Stages<'_>,
+) -> Result<Shots, Error> {
+    let look = |source: &FrameSource| match &source.file {
+        Some(file) => Ok(choose::sharpness(&read_upright(file)?)),
+        None => Ok(0.0),
+    };
+    let sharpness: Vec<Result<f64, Error>> = stages.run("look", |_| sources.par_iter().map(look).collect());
     let mut shots = Vec::new();
-    for ((source, camera), sharpness) in sources.into_iter().zip(&cameras).zip(sharpness) {
+    let size = cameras.iter().flatten().next().map_or([0, 0], |c| [c.intrinsics.width, c.intrinsics.height]);
+    for ((source, camera), sharpness) in sources.into_iter().zip(cameras).zip(sharpness) {
         shots.push(Shot {
             source,
             sharpness: sharpness?,
             motion: 0.0,
-            camera: Some(*camera),
-            pose: PoseSource::Measured,
+            camera,
+            pose: if camera.is_some() { PoseSource::Measured } else { PoseSource::Missing },
             angle: None,
             standpoint: None,
             corners: 0,
@@ -74,17 +115,8 @@ fn calibrated(footage: &Footage, path: &Path, stages: &mut Stages<'_>) -> Result
             fault: None,
         });
     }
-    let size = cameras.first().map_or([0, 0], |c| [c.intrinsics.width, c.intrinsics.height]);
-    Ok(Shots {
-        shots,
-        size,
-        calibration: None,
-        board: None,
-        told_by: format!("cameras of {}", path.display()),
-        unit: capture.unit,
-        has_plane: false,
-        findings: Vec::new(),
-    })
+    let has_plane = false;
+    Ok(Shots { shots, size, calibration: None, board: None, told_by, unit: None, has_plane, findings: Vec::new() })
 }
 
 /// The frames of footage that is photographs alone.

@@ -3,12 +3,12 @@
 use super::pictures::Pictures;
 use super::{FootageOptions, Shots};
 use crate::Error;
-use capture::light::{LightCheck, LightKind, ShadedSurface, ShadingSample, ball_from_outline, ball_light, judge_light};
+use crate::shading::shading_samples;
+use capture::light::{LightCheck, LightKind, ShadedSurface, ball_from_outline, ball_light, judge_light};
 use capture::silhouette::Silhouettes;
 use capture::{Camera, View};
 use geometry::hull::{HullOptions, visual_hull};
-use geometry::{DepthMap, Mesh};
-use nalgebra::{Point2, Point3, Vector3};
+use nalgebra::{Point2, Vector3};
 use rayon::prelude::*;
 use std::f64::consts::TAU;
 
@@ -25,10 +25,6 @@ pub struct FootageLight {
 const SIDE: usize = 320;
 /// Cells along the object's longest side.
 const CELLS: usize = 48;
-/// Places on the object whose shading is followed.
-const PLACES: usize = 300;
-/// Cosine of the steepest angle at which a place is looked at.
-const STEEPEST: f64 = 0.4;
 /// Points of the outline of a ball.
 const OUTLINE: usize = 32;
 
@@ -79,46 +75,17 @@ fn shading(views: &[View], shots: &Shots, kept: &[usize], silhouettes: &Silhouet
         ..HullOptions::default()
     };
     let mesh = visual_hull(views, &hull_options).ok()?.mesh;
-    let normals = mesh.vertex_normals();
-    let step = mesh.positions.len().div_ceil(PLACES).max(1);
-    let places: Vec<usize> = (0..mesh.positions.len()).step_by(step).collect();
-    let samples: Vec<Vec<ShadingSample>> = views
-        .par_iter()
-        .map(|view| {
-            let angle = shots.shots[kept[view.index]].angle.unwrap_or_else(|| azimuth(&view.camera));
-            seen(view, &mesh, &normals, &places, angle)
-        })
-        .collect();
-    let check = judge_light(&samples.concat(), ShadedSurface::AllAround);
+    let turn = |view: &View| shots.shots[kept[view.index]].angle.unwrap_or_else(|| -azimuth(&view.camera));
+    let angles: Vec<f64> = views.iter().map(turn).collect();
+    let check = judge_light(&shading_samples(&mesh, views, &angles, &Vector3::z()), ShadedSurface::AllAround);
     // A camera that is carried around leaves object and light alone.
-    Some(if shots.calibration.is_some() && shots.turntable().is_none() {
-        LightCheck { kind: LightKind::Object, ..check }
-    } else {
-        check
-    })
+    let is_carried = shots.calibration.is_some() && shots.turntable().is_none();
+    Some(if is_carried { LightCheck { kind: LightKind::Object, ..check } } else { check })
 }
 
 fn azimuth(camera: &Camera) -> f64 {
     let centre = camera.center();
-    -centre.y.atan2(centre.x)
-}
-
-/// Brightness of the places that the view sees well.
-fn seen(view: &View, mesh: &Mesh, normals: &[Vector3<f64>], places: &[usize], angle: f64) -> Vec<ShadingSample> {
-    let depth = DepthMap::render(mesh, &view.camera);
-    let eye = view.camera.center();
-    let sample = |&place: &usize| {
-        let position: Point3<f64> = mesh.positions[place];
-        let towards = (eye - position).normalize();
-        let at = view.camera.project(&position).filter(|p| view.camera.in_frame(p.pixel))?;
-        let [x, y] = [at.pixel.x as usize, at.pixel.y as usize];
-        let nearest = f64::from(depth.depth.at(x, y));
-        let is_seen =
-            normals[place].dot(&towards) > STEEPEST && at.depth < nearest * 1.01 && view.matte.at(x, y) == 255;
-        let brightness = view.image.at(x, y).map(|c| (f64::from(c) / 255.0).powf(2.2)).iter().sum();
-        is_seen.then_some(ShadingSample { angle, point: place, brightness })
-    };
-    places.iter().filter_map(sample).collect()
+    centre.y.atan2(centre.x)
 }
 
 /// Where the highlight of the ball says the light is. The ball stands in the room: its outline is the same in all frames

@@ -3,7 +3,7 @@
 use super::pictures::Pictures;
 use super::{FootageOptions, Shots};
 use crate::Error;
-use capture::footage::read_upright;
+use capture::footage::{FrameSource, read_upright};
 use capture::silhouette::{SilhouetteOptions, Silhouettes, StageSetup, check_silhouettes, find_silhouettes};
 use capture::{Image, read_matte};
 use std::path::Path;
@@ -18,7 +18,8 @@ pub(super) fn find(
     let setup = setup(shots, kept, options)?;
     match &options.masks {
         Some(folder) => {
-            let mattes = kept.iter().map(|&at| given(folder, shots, at)).collect::<Result<Vec<_>, _>>()?;
+            let mattes =
+                kept.iter().map(|&at| given(folder, &shots.shots[at].source)).collect::<Result<Vec<_>, _>>()?;
             Ok(check_silhouettes(&mattes, &setup)?)
         }
         None => Ok(find_silhouettes(&|at| pictures.read(at), &setup, &SilhouetteOptions::default())?),
@@ -43,8 +44,7 @@ fn clean_plate(path: &Path, [width, height]: [usize; 2]) -> Result<Image<[u8; 3]
 
 /// The mask of a frame: `NAME.png`, `NAME.EXT.png` or `NAME.mask.png` of a photograph, the number of the frame (any
 /// number of leading zeros) of a film.
-fn given(folder: &Path, shots: &Shots, at: usize) -> Result<Image<u8>, Error> {
-    let source = &shots.shots[at].source;
+pub(super) fn given(folder: &Path, source: &FrameSource) -> Result<Image<u8>, Error> {
     let names = match &source.file {
         Some(file) => {
             let part = |p: Option<&std::ffi::OsStr>| p.map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
@@ -58,9 +58,7 @@ fn given(folder: &Path, shots: &Shots, at: usize) -> Result<Image<u8>, Error> {
         let fault = format!("{}: has no mask for {} (looked for {})", folder.display(), source.name, names.join(", "));
         Error::Failed(format!("{fault}; add it, or leave the frame out of the footage"))
     };
-    let path = path.ok_or_else(missing)?;
-    let mask = read_matte(&path)?;
-    check_size(&path, [mask.width(), mask.height()], shots.size).map(|()| mask)
+    Ok(read_matte(&path.ok_or_else(missing)?)?)
 }
 
 fn check_size(path: &Path, [w, h]: [usize; 2], [width, height]: [usize; 2]) -> Result<(), Error> {

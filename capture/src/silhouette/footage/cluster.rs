@@ -11,6 +11,16 @@ pub(super) struct Cluster {
     pub(super) support: u8,
 }
 
+impl Cluster {
+    /// A place that the object covers in nearly all frames.
+    pub(super) const COVERED: Self = Self { colour: [0.0; 3], spread: f32::INFINITY, support: 0 };
+
+    /// Whether the object covers the place in nearly all frames.
+    pub(super) fn is_covered(&self) -> bool {
+        self.spread == f32::INFINITY
+    }
+}
+
 /// Whether two colours may be the same place in other light: noise and a few percent of shade.
 fn is_near(a: &[f32; 3], b: &[f32; 3]) -> bool {
     let brightest = a[0].max(a[1]).max(a[2]);
@@ -26,6 +36,10 @@ pub(super) fn densest(samples: &[[f32; 3]]) -> Option<Cluster> {
         let count = samples.iter().filter(|b| is_near(a, b)).count();
         if count > best.0 {
             best = (count, i);
+        }
+        // No other set can be larger by much.
+        if 3 * count >= 2 * samples.len() {
+            break;
         }
     }
     around(samples, samples.get(best.1)?)

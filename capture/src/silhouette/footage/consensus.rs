@@ -16,7 +16,12 @@ pub(super) struct Consensus {
     cell: f64,
     /// Per cell, x fastest: matte that all but the tolerated number of views exceed, 0 where too few views look.
     values: Vec<u8>,
+    /// Per block of cells, x fastest: whether it or a block beside it holds anything.
+    occupied: Vec<bool>,
 }
+
+/// Cells along the edge of a block.
+const BLOCK: usize = 4;
 
 /// How many views may contradict before a cell is carved.
 #[derive(Clone, Copy, Debug)]
@@ -44,16 +49,18 @@ impl Consensus {
             return None;
         }
         let size = [0, 1, 2].map(|i| ((extent[i] / cell).ceil() as usize).clamp(1, resolution));
-        let mut hull = Self { bounds: *bounds, size, cell, values: Vec::new() };
+        let mut hull = Self { bounds: *bounds, size, cell, values: Vec::new(), occupied: Vec::new() };
         let total = size[0] * size[1] * size[2];
+        let views = far_apart(views);
         let polled: Vec<(u8, u16)> = (0..total)
             .into_par_iter()
-            .map_init(Vec::new, |values, index| poll(&hull.center(index), views, dissent, values))
+            .map_init(Vec::new, |values, index| poll(&hull.center(index), &views, dissent, values))
             .collect();
         let most = polled.iter().map(|p| p.1).max().unwrap_or(0);
         let least = (most / 3).max(1);
         hull.values = polled.into_iter().map(|(value, seen)| if seen >= least { value } else { 0 }).collect();
         hull.drop_clutter();
+        hull.mark_occupied();
         hull.values.iter().any(|&v| v >= 128).then_some(hull)
     }
 
@@ -81,10 +88,26 @@ impl Consensus {
         Image::from_pixels(width, height, pixels).unwrap_or_default()
     }
 
-    fn center(&self, index: usize) -> Point3<f64> {
+    /// With all that is below the object down to the floor of the box: where it may stand.
+    pub(super) fn with_support(&self) -> Self {
+        let mut solid = self.clone();
+        let layer = self.size[0] * self.size[1];
+        for at in (0..solid.values.len().saturating_sub(layer)).rev() {
+            solid.values[at] = solid.values[at].max(solid.values[at + layer]);
+        }
+        solid.mark_occupied();
+        solid
+    }
+
+    /// Column, row and layer of a cell.
+    fn place(&self, index: usize) -> [usize; 3] {
         let [nx, ny, _] = self.size;
-        let at = Vector3::new((index % nx) as f64, (index / nx % ny) as f64, (index / nx / ny) as f64);
-        self.bounds.min + (at + Vector3::repeat(0.5)) * self.cell
+        [index % nx, index / nx % ny, index / nx / ny]
+    }
+
+    fn center(&self, index: usize) -> Point3<f64> {
+        let at = Vector3::from(self.place(index).map(|v| v as f64 + 0.5));
+        self.bounds.min + at * self.cell
     }
 
     /// `origin` and `direction` in cells.
@@ -108,26 +131,60 @@ impl Consensus {
         let mut largest = 0.0_f32;
         let mut at = from;
         while at <= to && largest < 254.0 {
-            largest = largest.max(self.trilinear(&(origin + direction * at)));
+            let place = origin + direction * at;
+            if !self.is_occupied(&place) {
+                at += BLOCK as f64 - 1.0;
+                continue;
+            }
+            largest = largest.max(self.trilinear(&place));
             at += 0.7;
         }
         largest as u8
     }
 
+    fn blocks(&self) -> [usize; 3] {
+        self.size.map(|n| n.div_ceil(BLOCK))
+    }
+
+    fn mark_occupied(&mut self) {
+        let [nx, ny, nz] = self.blocks();
+        let mut occupied = vec![false; nx * ny * nz];
+        for (at, _) in self.values.iter().enumerate().filter(|(_, v)| **v > 0) {
+            let [x, y, z] = self.place(at).map(|v| v / BLOCK);
+            for w in z.saturating_sub(1)..(z + 2).min(nz) {
+                for v in y.saturating_sub(1)..(y + 2).min(ny) {
+                    let row = (w * ny + v) * nx;
+                    occupied[row + x.saturating_sub(1)..row + (x + 2).min(nx)].fill(true);
+                }
+            }
+        }
+        self.occupied = occupied;
+    }
+
+    /// Whether anything is within a block of a place in cells.
+    fn is_occupied(&self, place: &Vector3<f64>) -> bool {
+        let blocks = self.blocks();
+        // Casts of what lies just outside saturate at 0.
+        let at = |axis: usize| (place[axis] as usize / BLOCK).min(blocks[axis] - 1);
+        self.occupied[(at(2) * blocks[1] + at(1)) * blocks[0] + at(0)]
+    }
+
     /// Value at a place in cells; 0 outside.
     fn trilinear(&self, place: &Vector3<f64>) -> f32 {
-        let [nx, ny, nz] = self.size.map(|n| n as isize);
-        let base = place.map(|p| (p - 0.5).floor());
-        let f = (place - Vector3::repeat(0.5) - base).map(|v| v as f32);
-        let (x, y, z) = (base.x as isize, base.y as isize, base.z as isize);
-        let at = |dx: isize, dy: isize, dz: isize| {
-            let (x, y, z) = (x + dx, y + dy, z + dz);
-            let is_in = x >= 0 && y >= 0 && z >= 0 && x < nx && y < ny && z < nz;
-            if is_in { f32::from(self.values[((z * ny + y) * nx + x) as usize]) } else { 0.0 }
+        let [nx, ny, nz] = self.size;
+        // From half a cell outside on: one more keeps the casts, which cut, from rounding up below 0.
+        let shifted = place.map(|p| (p + 0.5).max(0.0));
+        let base = shifted.map(|p| p as usize);
+        let f = Vector3::new(shifted.x - base.x as f64, shifted.y - base.y as f64, shifted.z - base.z as f64);
+        let f = f.map(|v| v as f32);
+        let at = |dx: usize, dy: usize, dz: usize| {
+            let (x, y, z) = (base.x + dx, base.y + dy, base.z + dz);
+            let is_in = x > 0 && y > 0 && z > 0 && x <= nx && y <= ny && z <= nz;
+            if is_in { f32::from(self.values[((z - 1) * ny + y - 1) * nx + x - 1]) } else { 0.0 }
         };
         let mix = |a: f32, b: f32, t: f32| a + (b - a) * t;
-        let along_x = |dy: isize, dz: isize| mix(at(0, dy, dz), at(1, dy, dz), f.x);
-        let along_y = |dz: isize| mix(along_x(0, dz), along_x(1, dz), f.y);
+        let along_x = |dy: usize, dz: usize| mix(at(0, dy, dz), at(1, dy, dz), f.x);
+        let along_y = |dz: usize| mix(along_x(0, dz), along_x(1, dz), f.y);
         mix(along_y(0), along_y(1), f.z)
     }
 
@@ -166,7 +223,7 @@ impl Consensus {
 
     fn neighbours(&self, index: usize) -> [Option<usize>; 6] {
         let [nx, ny, nz] = self.size;
-        let (x, y, z) = (index % nx, index / nx % ny, index / nx / ny);
+        let [x, y, z] = self.place(index);
         let plane = nx * ny;
         [
             (x > 0).then(|| index - 1),
@@ -179,16 +236,37 @@ impl Consensus {
     }
 }
 
-/// The matte all but the tolerated number of views exceed at `point`, and how many views see it.
+/// Neighbours see the same; in this order the first few see it all.
+fn far_apart<T: Copy>(views: &[T]) -> Vec<T> {
+    let stride = (views.len() as f64 * 0.382).round().max(1.0) as usize;
+    let stride = (stride..).find(|s| gcd(*s, views.len()) == 1).unwrap_or(1);
+    (0..views.len()).map(|i| views[i * stride % views.len()]).collect()
+}
+
+fn gcd(a: usize, b: usize) -> usize {
+    if b == 0 { a } else { gcd(b, a % b) }
+}
+
+/// The matte all but the tolerated number of views exceed at `point`, and how many views see it. Where more than
+/// could be tolerated see next to nothing there, the rest is not asked.
 fn poll(point: &Point3<f64>, views: &[(&Camera, &Image<u8>)], dissent: Dissent, values: &mut Vec<u8>) -> (u8, u16) {
+    let tolerated = |seen: usize| ((dissent.share * seen as f64) as usize).max(dissent.least).min(seen / 3);
+    let most_tolerated = tolerated(views.len());
     values.clear();
-    values.extend(views.iter().filter_map(|(camera, matte)| sample(camera, matte, point)));
+    let mut against = 0;
+    for (camera, matte) in views {
+        let Some(value) = sample(camera, matte, point) else { continue };
+        values.push(value);
+        against += usize::from(value < 16);
+        if against > most_tolerated {
+            return (0, 0);
+        }
+    }
     let seen = values.len();
     if seen == 0 {
         return (0, 0);
     }
-    let tolerated = ((dissent.share * seen as f64) as usize).max(dissent.least).min(seen / 3);
-    let (_, value, _) = values.select_nth_unstable(tolerated);
+    let (_, value, _) = values.select_nth_unstable(tolerated(seen));
     (*value, seen as u16)
 }
 

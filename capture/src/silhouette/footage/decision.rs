@@ -4,23 +4,24 @@ use super::Odds;
 use crate::Image;
 use crate::matte::{components, signed_distance};
 
-/// Pixels outside the hull at which nothing can be object: what the hull itself may be off.
-const REACH: f32 = 1.5;
-
 /// Log odds gained well inside the hull.
 const TRUST: f32 = 3.0;
+
+/// Log odds gained per pixel inside the hull.
+const SLOPE: f32 = 0.5;
 
 /// Object (255) or not, for voting where no hull is known yet: in between where the odds are even.
 pub(super) fn guessed(odds: &Odds) -> Image<u8> {
     odds.log_odds.map(|l| (255.0 / (1.0 + (-0.7 * l).exp())) as u8)
 }
 
-/// The silhouette (255 or 0). `hull` is that of all views, object from 128 on.
-pub(super) fn decided(odds: &Odds, hull: &Image<u8>) -> Image<u8> {
+/// The silhouette (255 or 0). `hull` is that of all views, object from 128 on; each pixel outside it costs `distrust`
+/// of the log odds.
+pub(super) fn decided(odds: &Odds, hull: &Image<u8>, distrust: f32) -> Image<u8> {
     let distance = signed_distance(hull);
     let object = odds.log_odds.pixels().iter().zip(distance.pixels()).map(|(&l, &d)| {
-        let prior = (0.5 * d).clamp(-TRUST, TRUST);
-        d > -REACH && l + prior > 0.0
+        let prior = if d > 0.0 { (SLOPE * d).min(TRUST) } else { distrust * d };
+        l + prior > 0.0
     });
     let mask = Image::from_pixels(hull.width(), hull.height(), object.collect()).unwrap_or_default();
     without_specks(&mask)

@@ -1,7 +1,7 @@
 //! Which silhouettes agree, and what to say of them.
 
 use super::consensus::{Consensus, Dissent};
-use super::palette::Palette;
+use super::palette::Palettes;
 use super::rounds::{Belief, Found, Part};
 use super::{Evidence, Silhouettes, StageSetup, stage};
 use crate::votes::rough_box;
@@ -40,9 +40,9 @@ pub fn check_silhouettes(mattes: &[Image<u8>], setup: &StageSetup) -> Result<Sil
         return Ok(summed_up(unjudged(parts), gains, setup, Evidence::Given));
     };
     let belief = Belief::none(search);
-    let coarse = agreed(parts, &belief, Palette::anything(), 64, Dissent { share: 0.15, least: 1 });
+    let coarse = agreed(parts, &belief, Palettes::anything(), 64, Dissent { share: 0.15, least: 1 });
     let belief = coarse.belief.unwrap_or(belief);
-    let found = agreed(coarse.parts, &belief, Palette::anything(), 128, Dissent { share: 0.04, least: 1 });
+    let found = agreed(coarse.parts, &belief, Palettes::anything(), 128, Dissent { share: 0.04, least: 1 });
     Ok(summed_up(found, gains, setup, Evidence::Given))
 }
 
@@ -63,7 +63,7 @@ pub(super) fn nothing_found(gains: Vec<[f64; 3]>, setup: &StageSetup) -> Silhoue
 pub(super) fn agreed(
     parts: Vec<Part>,
     belief: &Belief,
-    palette: Palette,
+    palettes: Palettes,
     resolution: usize,
     dissent: Dissent,
 ) -> Found {
@@ -90,7 +90,7 @@ pub(super) fn agreed(
         (agreement, contradicting) = judged(&hull);
     }
     let Some(bounds) = hull.tight_box(MARGIN_CELLS) else { return unjudged(parts) };
-    let belief = Belief { bounds: belief.within(&bounds), limits: belief.limits, hull: Some(hull), palette };
+    let belief = Belief { bounds: belief.within(&bounds), limits: belief.limits, hull: Some(hull), palettes };
     Found { belief: Some(belief), parts, agreement, contradicting }
 }
 

@@ -102,7 +102,7 @@ pub fn find_silhouettes(
     let coarse = rounds::Scene { fetch: &of_thumbnails, setup: &small, gains: &gains, cloths: &cloths, options };
     let fine = rounds::Scene { fetch, setup, gains: &gains, cloths: &cloths, options };
     let mut belief = rounds::Belief::none(search);
-    for round in [rounds::GUESS, rounds::COARSE] {
+    for round in [rounds::GUESS, rounds::GUESS, rounds::COARSE] {
         let Some(better) = coarse.round(&belief, &round)?.belief else {
             return Ok(judgement::nothing_found(gains, setup));
         };

@@ -8,7 +8,7 @@
 
 use super::cluster::Cluster;
 use super::light::Toned;
-use super::palette::Palette;
+use super::palette::Palettes;
 use super::shade::Shade;
 use crate::Image;
 use crate::matte::blur;
@@ -25,6 +25,12 @@ const DEEPEST_SHADOW: f32 = 0.35;
 /// Odds of one pixel are not trusted beyond this: neighbours share their errors.
 const LARGEST: f32 = 8.0;
 
+/// Log odds where nothing was ever seen behind the object, but for its colour.
+const COVERED: f32 = 0.5;
+
+/// What the colour alone can say.
+const LARGEST_BY_COLOUR: f32 = 4.0;
+
 /// What a frame shows behind the object.
 #[derive(Debug)]
 pub(super) struct Odds {
@@ -34,12 +40,13 @@ pub(super) struct Odds {
     pub(super) background: Image<Option<[f32; 3]>>,
 }
 
-/// Of a picture, given what room and target look like from there (support 0 where they are unknown).
+/// Of a picture, given what room and target look like from there. Where both are
+/// unknown (support 0) the two palettes decide.
 pub(super) fn of(
     picture: &Toned,
     room: Option<&Image<Cluster>>,
     target: Option<(&Image<Cluster>, &Shade)>,
-    palette: &Palette,
+    palettes: &Palettes,
     size: (usize, usize),
 ) -> Odds {
     let (width, height) = size;
@@ -53,10 +60,17 @@ pub(super) fn of(
                 Cluster { colour: cluster.colour.map(|v| v * factor), ..cluster }
             });
             let known = |c: &Cluster| c.support > 0;
-            // The target hides the room.
-            let Some(behind) = on_target.filter(known).or(room.map(|r| r.at(x, y)).filter(known)) else { continue };
+            // The target hides the room, even where it is itself hidden.
+            let is_covered = on_target.is_some_and(|c| c.is_covered());
+            let in_room = room.map(|r| r.at(x, y)).filter(|c| known(c) && !is_covered);
+            let Some(behind) = on_target.filter(known).or(in_room) else {
+                let colour = picture.at(x, y);
+                let odds = palettes.object.log_density(&colour) - palettes.surroundings.log_density(&colour);
+                log_odds.set(x, y, (odds + COVERED).clamp(-LARGEST_BY_COLOUR, LARGEST_BY_COLOUR));
+                continue;
+            };
             let colour = picture.at(x, y);
-            let odds = palette.log_density(&colour) - log_density(&colour, &behind);
+            let odds = palettes.object.log_density(&colour) - log_density(&colour, &behind);
             log_odds.set(x, y, odds.clamp(-LARGEST, LARGEST));
             background.set(x, y, Some(behind.colour));
         }

@@ -1,4 +1,4 @@
-//! The colours of the object, as far as they are known.
+//! The colours of the object and of what is around it, as far as they are known.
 
 /// Bins along a channel.
 const BINS: usize = 16;
@@ -18,7 +18,7 @@ impl Palette {
         Self { density: vec![256.0_f32.powi(-3); BINS * BINS * BINS] }
     }
 
-    /// Of colours seen on the object; with few of them still nearly anything.
+    /// Of colours seen; with few of them still nearly anything.
     pub(super) fn learned(colours: impl Iterator<Item = [f32; 3]>) -> Self {
         let mut counts = vec![0.0_f32; BINS * BINS * BINS];
         let mut total = 0.0_f32;
@@ -38,6 +38,20 @@ impl Palette {
     /// Natural logarithm of the density at a colour.
     pub(super) fn log_density(&self, colour: &[f32; 3]) -> f32 {
         self.density[bin(colour)].ln()
+    }
+}
+
+/// Of the object, and of what is around it.
+#[derive(Clone, Debug)]
+pub(super) struct Palettes {
+    pub(super) object: Palette,
+    pub(super) surroundings: Palette,
+}
+
+impl Palettes {
+    /// As long as nothing is known.
+    pub(super) fn anything() -> Self {
+        Self { object: Palette::anything(), surroundings: Palette::anything() }
     }
 }
 

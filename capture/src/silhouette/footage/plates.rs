@@ -10,10 +10,10 @@ use nalgebra::Point3;
 use rayon::prelude::*;
 
 /// Texels along a side of the target's plate, at most.
-const MOST_TEXELS: f64 = 1400.0;
+const MOST_TEXELS: f64 = 1000.0;
 
 /// Appearances that vary more than this (standard deviation, encoded levels) explain nothing.
-const LARGEST_SPREAD: f32 = 22.0;
+const LARGEST_SPREAD: f32 = 40.0;
 
 /// Views of a place on the target that must agree.
 const LEAST_SUPPORT: u8 = 3;
@@ -120,7 +120,7 @@ impl TargetPlate {
         Some(plate)
     }
 
-    /// Colour and spread at a place on the plane; `None` where too little is known.
+    /// Colour and spread at a place on the plane, or [`Cluster::COVERED`]; `None` where too little is known.
     pub(super) fn at(&self, place: [f64; 2]) -> Option<Cluster> {
         let [x, y] = [0, 1].map(|i| (place[i] - self.origin[i]) / self.texel - 0.5);
         let (width, height) = (self.texture.width(), self.texture.height());
@@ -130,6 +130,9 @@ impl TargetPlate {
         let (column, row) = (x as usize, y as usize);
         let (fx, fy) = ((x - column as f64) as f32, (y - row as f64) as f32);
         let texels = [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(dx, dy)| self.texture.at(column + dx, row + dy));
+        if texels.iter().any(Cluster::is_covered) {
+            return Some(Cluster::COVERED);
+        }
         if texels.iter().any(|t| t.support < LEAST_SUPPORT || t.spread > LARGEST_SPREAD) {
             return None;
         }
@@ -150,7 +153,7 @@ impl TargetPlate {
 
     fn shade(&self, frame: &PlateFrame) -> Shade {
         let seen = self.predicted(&frame.camera);
-        Shade::of(&frame.picture, &seen, frame.hidden.as_ref())
+        Shade::of(&frame.picture, &seen, frame.hidden.as_ref(), seen.width().max(seen.height()))
     }
 
     /// What a camera would see of the plane; support 0 where it does not.
@@ -173,13 +176,21 @@ impl TargetPlate {
             let y = self.origin[1] + ((at / width) as f64 + 0.5) * self.texel;
             let point = Point3::new(x, y, 0.0);
             samples.clear();
+            let mut hidden = 0;
             for (i, frame) in frames.iter().enumerate() {
                 let Some(pixel) = frame.camera.project(&point).map(|p| p.pixel) else { continue };
-                if !frame.camera.in_frame(pixel) || frame.is_hidden(pixel.x as usize, pixel.y as usize) {
+                if !frame.camera.in_frame(pixel) {
+                    continue;
+                }
+                if frame.is_hidden(pixel.x as usize, pixel.y as usize) {
+                    hidden += 1;
                     continue;
                 }
                 let shade = shades.map_or(1.0, |s| s[i].at(pixel.x, pixel.y));
                 samples.push(frame.picture.between(pixel.x, pixel.y).map(|v| v / shade));
+            }
+            if hidden > 0 && samples.len() < usize::from(LEAST_SUPPORT) {
+                return Cluster::COVERED;
             }
             let found = cluster::densest(samples).unwrap_or_default();
             // Less than a third of the views is no agreement.

@@ -47,7 +47,8 @@ fn sides(
     behind: &impl Fn(usize, usize) -> Option<[f32; 3]>,
 ) -> Option<([f32; 3], [f32; 3])> {
     let (mut object, mut object_weight) = ([0.0_f32; 3], 0.0_f32);
-    let (mut outside, mut outside_weight) = ([0.0_f32; 3], 0.0_f32);
+    let mut outside_weight = 0.0_f32;
+    let (mut beside, mut beside_weight) = ([0.0_f32; 3], 0.0_f32);
     let (mut seen, mut expected) = (0.0_f32, 0.0_f32);
     let range = |v: usize, size: usize| {
         let v = v as isize;
@@ -67,8 +68,11 @@ fn sides(
                 (0..3).for_each(|c| object[c] += weight * colour[c]);
                 object_weight += weight;
             } else {
-                (0..3).for_each(|c| outside[c] += weight * colour[c]);
                 outside_weight += weight;
+                // Of a pattern the nearest pixels alone say what goes on under the edge.
+                let near = (-12.0 * squared).exp();
+                (0..3).for_each(|c| beside[c] += near * colour[c]);
+                beside_weight += near;
                 if let Some(b) = behind(u, v) {
                     seen += weight * colour.iter().sum::<f32>();
                     expected += weight * b.iter().sum::<f32>();
@@ -85,7 +89,7 @@ fn sides(
             let ratio = if expected > 1e-3 { (seen / expected).clamp(0.3, 1.3) } else { 1.0 };
             b.map(|v| v * ratio)
         }
-        None => outside.map(|v| v / outside_weight),
+        None => beside.map(|v| v / beside_weight.max(1e-12)),
     };
     Some((object.map(|v| v / object_weight), background))
 }

@@ -5,11 +5,11 @@ use super::cluster::{self, Cluster};
 use super::consensus::{Consensus, Dissent};
 use super::light::Toned;
 use super::optics::Cutout;
-use super::palette::Palette;
+use super::palette::{Palette, Palettes};
 use super::plates::{self, PlateFrame, TargetPlate};
 use super::shade::Shade;
 use super::{FetchFrame, SilhouetteOptions, StageSetup, decision, judgement, odds, rim};
-use crate::matte::{erode, grow, signed_distance};
+use crate::matte::{grow, signed_distance};
 use crate::{Aabb, Camera, CaptureError, Image};
 use rayon::prelude::*;
 
@@ -37,18 +37,33 @@ pub(super) struct Round {
     resolution: usize,
     /// Views that may contradict.
     dissent: Dissent,
+    /// Whether the hull is still too coarse to decide, and the object may stand on more than is seen of it.
+    is_guess: bool,
+    /// Log odds that a pixel of distance outside the hull costs: little as long as too much may be carved.
+    distrust: f32,
+    /// Pixels around the hull that may be object as well.
+    hidden_px: f64,
     /// Whether coverage at the edge is asked for.
     is_refined: bool,
 }
 
-/// With no hull yet: clutter and holes are many.
-pub(super) const GUESS: Round = Round { resolution: 80, dissent: Dissent { share: 0.2, least: 1 }, is_refined: false };
+/// Dissent tolerated among views of which `share` err.
+const fn up_to(share: f64) -> Dissent {
+    Dissent { share, least: 1 }
+}
+
+/// On thumbnails, first without and then with a rough hull: clutter and holes are many.
+pub(super) const GUESS: Round =
+    Round { resolution: 80, dissent: up_to(0.2), is_guess: true, distrust: 0.0, hidden_px: 2.0, is_refined: false };
 /// On thumbnails, with a hull.
-pub(super) const COARSE: Round = Round { resolution: 96, dissent: Dissent { share: 0.1, least: 1 }, is_refined: false };
+pub(super) const COARSE: Round =
+    Round { resolution: 96, dissent: up_to(0.12), is_guess: false, distrust: 0.5, hidden_px: 2.5, is_refined: false };
 /// At full size.
-pub(super) const FINE: Round = Round { resolution: 128, dissent: Dissent { share: 0.05, least: 1 }, is_refined: true };
+pub(super) const FINE: Round =
+    Round { resolution: 128, dissent: up_to(0.08), is_guess: false, distrust: 0.5, hidden_px: 2.5, is_refined: true };
 /// At full size, for good.
-pub(super) const LAST: Round = Round { resolution: 160, dissent: Dissent { share: 0.03, least: 1 }, is_refined: true };
+pub(super) const LAST: Round =
+    Round { resolution: 160, dissent: up_to(0.04), is_guess: false, distrust: 2.0, hidden_px: 2.5, is_refined: true };
 
 /// What is known of the object.
 #[derive(Clone, Debug)]
@@ -58,17 +73,19 @@ pub(super) struct Belief {
     /// Nothing of it can be outside.
     pub(super) limits: Aabb,
     pub(super) hull: Option<Consensus>,
-    pub(super) palette: Palette,
+    pub(super) palettes: Palettes,
 }
 
 impl Belief {
     pub(super) fn none(limits: Aabb) -> Self {
-        Self { bounds: limits, limits, hull: None, palette: Palette::anything() }
+        Self { bounds: limits, limits, hull: None, palettes: Palettes::anything() }
     }
 
-    /// The part of a box that is possible.
+    /// The part of a box that is possible, down to where the object stands.
     pub(super) fn within(&self, bounds: &Aabb) -> Aabb {
-        Aabb { min: bounds.min.sup(&self.limits.min), max: bounds.max.inf(&self.limits.max) }
+        let mut inside = Aabb { min: bounds.min.sup(&self.limits.min), max: bounds.max.inf(&self.limits.max) };
+        inside.min.z = self.limits.min.z;
+        inside
     }
 }
 
@@ -92,14 +109,15 @@ pub(super) struct Part {
     pub(super) matte: Image<u8>,
     /// Share of the object, well inside, that is explained as background.
     pub(super) unseparated: f64,
-    colours: Vec<[f32; 3]>,
+    /// Some colours of the object, and of what is around it.
+    colours: [Vec<[f32; 3]>; 2],
 }
 
 impl Part {
     /// A silhouette from elsewhere.
     pub(super) fn given(camera: &Camera, matte: &Image<u8>) -> Self {
         let cutout = Cutout::whole(camera);
-        Self { cutout, camera: *camera, matte: matte.clone(), unseparated: 0.0, colours: Vec::new() }
+        Self { cutout, camera: *camera, matte: matte.clone(), unseparated: 0.0, colours: [Vec::new(), Vec::new()] }
     }
 }
 
@@ -115,26 +133,25 @@ impl Scene<'_> {
         let count = self.setup.cameras.len();
         let cutouts: Vec<Cutout> =
             self.setup.cameras.iter().map(|c| Cutout::around(&belief.bounds, c, MARGIN)).collect();
-        let plates = self.plates(belief, &cutouts)?;
+        let plates = self.plates(belief, &cutouts, round)?;
         let parts: Vec<_> = (0..count)
             .into_par_iter()
             .map(|i| (self.fetch)(i).map(|image| self.part(i, &image, belief, &plates, cutouts[i], round)))
             .collect();
         let parts: Vec<Part> = parts.into_iter().collect::<Result<_, _>>()?;
-        let palette = Palette::learned(parts.iter().flat_map(|p| p.colours.iter().copied()));
-        Ok(judgement::agreed(parts, belief, palette, round.resolution, round.dissent))
+        let [object, surroundings] =
+            [0, 1].map(|side| Palette::learned(parts.iter().flat_map(|p: &Part| p.colours[side].iter().copied())));
+        let palettes = Palettes { object, surroundings };
+        Ok(judgement::agreed(parts, belief, palettes, round.resolution, round.dissent))
     }
 
-    /// The hull's silhouette in the cut-out of a frame.
-    fn hull_in(&self, frame: usize, belief: &Belief, cutout: Cutout) -> Option<Image<u8>> {
-        belief.hull.as_ref().map(|h| h.silhouette(&cutout.camera(&self.setup.cameras[frame])))
-    }
-
-    fn plates(&self, belief: &Belief, cutouts: &[Cutout]) -> Result<Plates, CaptureError> {
+    fn plates(&self, belief: &Belief, cutouts: &[Cutout], round: &Round) -> Result<Plates, CaptureError> {
         let count = self.setup.cameras.len();
         let wanted = self.options.plate_frames.clamp(3, count.max(3)).min(count);
         let chosen: Vec<usize> = (0..wanted).map(|i| i * count / wanted).collect();
-        let frames: Vec<_> = chosen.par_iter().map(|&i| self.plate_frame(i, belief, cutouts[i])).collect();
+        let hull = belief.hull.as_ref().map(|h| if round.is_guess { h.with_support() } else { h.clone() });
+        let frames: Vec<_> =
+            chosen.par_iter().map(|&i| self.plate_frame(i, hull.as_ref(), cutouts[i], round)).collect();
         let frames: Vec<PlateFrame> = frames.into_iter().collect::<Result<_, _>>()?;
         let target = if self.setup.has_plane { TargetPlate::of(&frames, &belief.bounds) } else { None };
         let room = |segment: usize| {
@@ -148,10 +165,17 @@ impl Scene<'_> {
         Ok(Plates { rooms: (0..self.setup.segment_count()).map(room).collect(), target })
     }
 
-    fn plate_frame(&self, i: usize, belief: &Belief, cutout: Cutout) -> Result<PlateFrame, CaptureError> {
+    fn plate_frame(
+        &self,
+        i: usize,
+        hull: Option<&Consensus>,
+        cutout: Cutout,
+        round: &Round,
+    ) -> Result<PlateFrame, CaptureError> {
         let image = (self.fetch)(i)?;
         let camera = self.setup.cameras[i];
-        let hidden = self.hull_in(i, belief, cutout).map(|h| cutout.back(&grow(&h, 2.0), &camera, 0));
+        let hidden =
+            hull.map(|h| cutout.back(&grow(&h.silhouette(&cutout.camera(&camera)), round.hidden_px), &camera, 0));
         let picture = Toned::new(image, &self.gains[i]);
         Ok(PlateFrame { picture, camera, segment: self.setup.segments[i], hidden })
     }
@@ -167,22 +191,24 @@ impl Scene<'_> {
     ) -> Part {
         let camera = cutout.camera(&self.setup.cameras[i]);
         let picture = Toned::new(cutout.of(image), &self.gains[i]);
-        let hull = self.hull_in(i, belief, cutout);
+        let hull = belief.hull.as_ref().map(|h| h.silhouette(&camera));
+        let whole = self.setup.cameras[i].intrinsics;
+        let longest = whole.width.max(whole.height);
         let target = plates.target.as_ref().map(|t| {
             let seen = t.predicted(&camera);
-            let hidden = hull.as_ref().map(|h| grow(h, 2.0));
-            let shade = Shade::of(&picture, &seen, hidden.as_ref());
+            let hidden = hull.as_ref().map(|h| grow(h, round.hidden_px));
+            let shade = Shade::of(&picture, &seen, hidden.as_ref(), longest);
             (seen, shade)
         });
         let room = self.setup.segments[i].and_then(|s| plates.rooms[s].as_ref()).map(|r| cutout.of(r));
         let target = target.as_ref().map(|(seen, shade)| (seen, shade));
-        let odds = odds::of(&picture, room.as_ref(), target, &belief.palette, (cutout.width, cutout.height));
-        let Some(hull) = hull else {
+        let odds = odds::of(&picture, room.as_ref(), target, &belief.palettes, (cutout.width, cutout.height));
+        let Some(hull) = hull.filter(|_| !round.is_guess) else {
             let matte = decision::guessed(&odds);
             let colours = colours(&picture, &odds.log_odds, &matte);
             return Part { cutout, camera, matte, unseparated: 0.0, colours };
         };
-        let mask = decision::decided(&odds, &hull);
+        let mask = decision::decided(&odds, &hull, round.distrust);
         let matte = if round.is_refined {
             let once = rim::refined(&picture, &odds.background, &mask);
             rim::refined(&picture, &odds.background, &once)
@@ -194,14 +220,16 @@ impl Scene<'_> {
     }
 }
 
-/// Of pixels that are object by themselves, not at its edge.
-fn colours(picture: &Toned, log_odds: &Image<f32>, matte: &Image<u8>) -> Vec<[f32; 3]> {
-    let inner = erode(matte, 1.5);
+/// Of pixels that are object, and background, by themselves and not at its edge.
+fn colours(picture: &Toned, log_odds: &Image<f32>, matte: &Image<u8>) -> [Vec<[f32; 3]>; 2] {
+    let distance = signed_distance(matte);
     let width = matte.width();
-    let sure: Vec<usize> =
-        (0..width * matte.height()).filter(|&i| inner.pixels()[i] == 255 && log_odds.pixels()[i] > 1.0).collect();
-    let step = sure.len().div_ceil(PALETTE_SAMPLES).max(1);
-    sure.iter().step_by(step).map(|&i| picture.at(i % width, i / width)).collect()
+    [1.0, -1.0].map(|side| {
+        let is_sure = |i: &usize| side * distance.pixels()[*i] > 2.0 && side * log_odds.pixels()[*i] > 1.0;
+        let sure: Vec<usize> = (0..width * matte.height()).filter(is_sure).collect();
+        let step = sure.len().div_ceil(PALETTE_SAMPLES).max(1);
+        sure.iter().step_by(step).map(|&i| picture.at(i % width, i / width)).collect()
+    })
 }
 
 /// Share of what is well inside the hull that is likelier background.

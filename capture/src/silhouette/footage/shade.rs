@@ -4,14 +4,13 @@ use super::cluster::Cluster;
 use super::light::Toned;
 use crate::Image;
 
-/// Blocks along the longer side of a frame.
-const BLOCKS: usize = 40;
+/// Blocks along the longer side of a frame, and ratios that are another light and not another thing: first where the
+/// object may be anywhere, then where it is known and shadows may be followed to its feet.
+const CAREFUL: (usize, std::ops::RangeInclusive<f32>) = (40, 0.7..=1.35);
+const CLOSE: (usize, std::ops::RangeInclusive<f32>) = (80, 0.4..=1.35);
 
 /// Darker places (encoded levels) say little of the light.
 const LEAST_LEVEL: f32 = 45.0;
-
-/// Ratios beyond this are another thing, not another light.
-const RANGE: std::ops::RangeInclusive<f32> = 0.55..=1.35;
 
 /// Factor on encoded levels, smooth over a frame.
 #[derive(Clone, Debug)]
@@ -22,10 +21,11 @@ pub(super) struct Shade {
 
 impl Shade {
     /// From a frame and what was expected of it (support 0 where nothing is); places where `hidden` ≥ 128 do not
-    /// speak.
-    pub(super) fn of(picture: &Toned, expected: &Image<Cluster>, hidden: Option<&Image<u8>>) -> Self {
+    /// speak. `longest` is the longer side of the whole frame in pixels.
+    pub(super) fn of(picture: &Toned, expected: &Image<Cluster>, hidden: Option<&Image<u8>>, longest: usize) -> Self {
         let (width, height) = (expected.width(), expected.height());
-        let block = width.max(height).div_ceil(BLOCKS).max(4);
+        let (blocks, range) = if hidden.is_some() { CLOSE } else { CAREFUL };
+        let block = longest.div_ceil(blocks).max(5);
         let (columns, rows) = (width.div_ceil(block), height.div_ceil(block));
         let mut factors: Image<Option<f32>> = Image::filled(columns, rows, None);
         let mut ratios = Vec::new();
@@ -35,7 +35,7 @@ impl Shade {
                 for y in row * block..((row + 1) * block).min(height) {
                     for x in column * block..((column + 1) * block).min(width) {
                         if hidden.is_none_or(|h| h.at(x, y) < 128) {
-                            ratios.extend(ratio(&picture.at(x, y), &expected.at(x, y)));
+                            ratios.extend(ratio(&picture.at(x, y), &expected.at(x, y), &range));
                         }
                     }
                 }
@@ -61,14 +61,14 @@ impl Shade {
 }
 
 /// Of all channels alike, where the hue is the expected one.
-fn ratio(seen: &[f32; 3], expected: &Cluster) -> Option<f32> {
+fn ratio(seen: &[f32; 3], expected: &Cluster, range: &std::ops::RangeInclusive<f32>) -> Option<f32> {
     let e = expected.colour;
     if expected.support == 0 || e.iter().sum::<f32>() < 3.0 * LEAST_LEVEL {
         return None;
     }
     let ratio = seen.iter().sum::<f32>() / e.iter().sum::<f32>();
     let is_same_hue = (0..3).all(|c| (seen[c] - ratio * e[c]).abs() < 8.0 + 0.05 * e[c]);
-    (is_same_hue && RANGE.contains(&ratio)).then_some(ratio)
+    (is_same_hue && range.contains(&ratio)).then_some(ratio)
 }
 
 /// Blocks that know nothing take the mean of their neighbours, ring by ring; 1 where nothing is known at all.
