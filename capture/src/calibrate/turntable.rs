@@ -216,7 +216,7 @@ fn angle_about_z(rotation: &UnitQuaternion<f64>) -> f64 {
 }
 
 /// Where a camera was most likely moved in the middle of a segment: by how much a second pose from there on would lower
-/// the squared misfit, by one Gauss–Newton step on robust weights (the score test). `None` if nowhere by much.
+/// the squared misfit, by one Gauss–Newton step on robust weights (the score test, Rao 1948). `None` if nowhere by much.
 pub(super) fn likeliest_move(rig: &Rig, pictures: &[Picture], noise: f64) -> Option<(usize, usize)> {
     let Poses::Turning(turning) = &rig.poses else { return None };
     let scores: Vec<Score> = (0..pictures.len()).map(|k| score(rig, turning, &pictures[k], k, noise)).collect();
