@@ -402,6 +402,7 @@ pub(super) fn canonical(
     let change = turning.world_from_target * next.world_from_target.inverse();
     let sign = (change.rotation * Vector3::z()).z.signum();
     for segment in &mut next.segments {
+        // By nothing, which makes the rotation one again after many products.
         *segment = moved(&(*segment * change), &Vector6::zeros());
     }
     next.angles.iter_mut().for_each(|angle| *angle *= sign);
