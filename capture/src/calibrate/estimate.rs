@@ -1,7 +1,8 @@
 //! From cleaned pictures to a rig that fits: the lens roughly, poses freely, then, if it turns, about one axis.
 
-use super::bundle::{Fit, Freedom, settle};
+use super::bundle::{Fit, settle};
 use super::clean::{Cleaned, upside_down};
+use super::equations::Freedom;
 use super::homography::{constraint_ratio, fit_robust, median};
 use super::lens::LensPrior;
 use super::pose::{Candidate, candidates, choose, plane_near, plane_of};
@@ -41,6 +42,8 @@ const RELIEF: f64 = 0.8;
 /// Moves of the camera looked for.
 const MOST_MOVES: usize = 8;
 
+const UNFIT: CalibrateError = CalibrateError::Failed { fault: "no pose fits them" };
+
 /// A rig that fits.
 pub(super) struct Estimate {
     pub(super) rig: Rig,
@@ -70,7 +73,7 @@ pub(super) fn estimate(
     let pictures = std::mem::take(&mut cleaned.pictures);
     let flat = Flat { points: &points, plane: plane.as_ref(), opposite: opposite.as_deref() };
     let lens = first_lens(&flat, &pictures, options, &prior);
-    let (pictures, poses) = free_poses(&flat, &lens, pictures);
+    let (mut pictures, poses) = free_poses(&flat, &lens, pictures);
     let usable = pictures.iter().filter(|p| p.is_used).count();
     let is_lens_known = matches!(options.lens, LensKnowledge::Known(_));
     let needed = if is_lens_known && options.motion == Some(MotionKind::FreeHand) { 1 } else { 2 };
@@ -79,20 +82,10 @@ pub(super) fn estimate(
     }
     let constraint_ratio = plane.as_ref().map(|plane| tilts(&flat, plane, &lens, &pictures));
     let free = if is_lens_known { Vec::new() } else { USUAL.to_vec() };
-    let rig = Rig { lens, shape, poses: Poses::Free(poses) };
-    let mut first = Estimate {
-        fit: Fit { cost: 0.0, corners: 0, noise: 0.0, information: nalgebra::DMatrix::zeros(0, 0) },
-        rig,
-        pictures,
-        free,
-        prior,
-        plane,
-        constraint_ratio,
-        free_rms_px: 0.0,
-        unreached,
-    };
-    first.settle()?;
-    first.free_rms_px = first.fit.rms_px();
+    let mut rig = Rig { lens, shape, poses: Poses::Free(poses) };
+    let fit = settle(&mut rig, &mut pictures, Freedom { lens: &free, prior: &prior }).ok_or(UNFIT)?;
+    let free_rms_px = fit.rms_px();
+    let first = Estimate { rig, pictures, fit, free, prior, plane, constraint_ratio, free_rms_px, unreached };
     let mut best = match options.motion {
         Some(MotionKind::FreeHand) => first,
         wanted => first.turning(wanted == Some(MotionKind::Turntable))?,
@@ -218,8 +211,7 @@ fn tilts(flat: &Flat, plane: &Isometry3<f64>, lens: &Intrinsics, pictures: &[Pic
 impl Estimate {
     fn settle(&mut self) -> Result<(), CalibrateError> {
         let freedom = Freedom { lens: &self.free, prior: &self.prior };
-        let failed = CalibrateError::Failed { fault: "no pose fits them" };
-        self.fit = settle(&mut self.rig, &mut self.pictures, freedom).ok_or(failed)?;
+        self.fit = settle(&mut self.rig, &mut self.pictures, freedom).ok_or(UNFIT)?;
         Ok(())
     }
 

@@ -85,7 +85,7 @@ fn lens_findings(result: &Calibration) -> Vec<String> {
         };
         let what: Vec<String> = terms.iter().filter_map(unit).collect();
         let why = if *is_degenerate {
-            "The target was always seen at one tilt, which hardly tells focal length and centre apart: they rest on what \
+            "The target was seen at one tilt or nearly, which hardly tells focal length and centre apart: they rest on what \
              is usual for cameras, and on how the lens bends lines"
         } else {
             "The pictures tell the lens only roughly"

@@ -17,6 +17,7 @@
 
 mod bundle;
 mod clean;
+mod equations;
 mod error;
 mod estimate;
 mod fill;

@@ -216,7 +216,7 @@ fn angle_about_z(rotation: &UnitQuaternion<f64>) -> f64 {
 }
 
 /// Where a camera was most likely moved in the middle of a segment: by how much a second pose from there on would lower
-/// the squared misfit, by one Gauss–Newton step on robust weights (the score test). `None` if nowhere by much.
+/// the squared misfit, by one Gauss–Newton step on robust weights (the score test, Rao 1948). `None` if nowhere by much.
 pub(super) fn likeliest_move(rig: &Rig, pictures: &[Picture], noise: f64) -> Option<(usize, usize)> {
     let Poses::Turning(turning) = &rig.poses else { return None };
     let scores: Vec<Score> = (0..pictures.len()).map(|k| score(rig, turning, &pictures[k], k, noise)).collect();
@@ -402,6 +402,7 @@ pub(super) fn canonical(
     let change = turning.world_from_target * next.world_from_target.inverse();
     let sign = (change.rotation * Vector3::z()).z.signum();
     for segment in &mut next.segments {
+        // By nothing, which makes the rotation one again after many products.
         *segment = moved(&(*segment * change), &Vector6::zeros());
     }
     next.angles.iter_mut().for_each(|angle| *angle *= sign);

@@ -165,3 +165,19 @@ fn a_camera_above_the_axis_sees_it_turn() {
         assert!(result.frames.iter().all(|f| f.standing == Standing::Used));
     }
 }
+
+#[test]
+fn a_camera_carried_around_in_a_circle_is_no_turntable() {
+    let film = Film { dropped: 0.1, ..Film::flat(30.0, 60) };
+    let mut chance = Chance(39);
+    let poses: Vec<Isometry3<f64>> = (0..60)
+        .map(|k| {
+            // A hand that does its best: a few millimetres and half a degree.
+            let mut shake = || Vector3::new(chance.normal(), chance.normal(), chance.normal());
+            Isometry3::new(0.004 * shake(), 0.009 * shake()) * film.pose(k)
+        })
+        .collect();
+    let result = of_board(&sightings(&film.lens, &film.points, &poses, 0.1, 0.1, 40), &options());
+    assert_eq!(result.motion, Motion::FreeHand);
+    assert!(result.rms_px < 0.16 && result.frames.iter().all(|f| f.standing == Standing::Used));
+}
