@@ -23,6 +23,13 @@ use serde::Serialize;
 use std::f64::consts::TAU;
 use std::fmt;
 
+/// Neighbours to each side with which the sharpness of a frame is compared, at least…
+const LEAST_REACH: usize = 5;
+/// …and as part of the film: 15° of one turn.
+const FILM_PER_REACH: usize = 24;
+/// Frames below this share of the sharpness of the whole film are blurred, whatever is around them.
+const FAINT: f64 = 0.12;
+
 /// What is known of one frame of a film.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FilmFrame {
@@ -72,7 +79,8 @@ pub struct ChooseOptions {
     pub min_step_deg: f64,
     /// Larger gaps between neighbours are reported, degrees; of captures with wide steps, 2.5 times the middle step.
     pub gap_deg: f64,
-    /// Frames below this share of the film's own sharpness (its upper quartile) are blurred.
+    /// Frames below this share of the sharpness of those around them (their upper quartile) are blurred: sides of the
+    /// object differ in detail, neighbours do not.
     pub min_sharpness: f64,
     /// Frames above this blur in pixels are blurred; of films that are blurred throughout, those above 1.5 times
     /// their lower quartile.
@@ -134,7 +142,7 @@ pub struct Gap {
 
 impl Default for ChooseOptions {
     fn default() -> Self {
-        Self { most: 72, min_step_deg: 5.0, gap_deg: 15.0, min_sharpness: 0.4, max_blur_px: 1.5, up: Vector3::z() }
+        Self { most: 72, min_step_deg: 5.0, gap_deg: 15.0, min_sharpness: 0.35, max_blur_px: 1.5, up: Vector3::z() }
     }
 }
 
@@ -189,14 +197,21 @@ fn faults(frames: &[FilmFrame], options: &ChooseOptions) -> Vec<Option<DropReaso
         _ => None,
     };
     let posed: Vec<Option<DropReason>> = frames.iter().map(without_pose).collect();
-    let sound: Vec<&FilmFrame> =
-        frames.iter().zip(&posed).filter(|(_, fault)| fault.is_none()).map(|(f, _)| f).collect();
-    let least_sharpness = options.min_sharpness * quantile(sound.iter().map(|f| f.sharpness), 0.75).unwrap_or(0.0);
-    let usual_blur = quantile(sound.iter().filter_map(|f| f.blur_px), 0.25).unwrap_or(0.0);
+    let sound: Vec<usize> = (0..frames.len()).filter(|&i| posed[i].is_none()).collect();
+    let sharp = |of: &[usize]| quantile(of.iter().map(|&i| frames[i].sharpness), 0.75).unwrap_or(0.0);
+    let least_anywhere = FAINT * sharp(&sound);
+    let usual_blur = quantile(sound.iter().filter_map(|&i| frames[i].blur_px), 0.25).unwrap_or(0.0);
     let most_blur = options.max_blur_px.max(1.5 * usual_blur);
-    let is_blurred = |f: &FilmFrame| f.sharpness < least_sharpness || f.blur_px.is_some_and(|blur| blur > most_blur);
-    let blurred = |f: &FilmFrame| is_blurred(f).then_some(DropReason::Blurred);
-    frames.iter().zip(posed).map(|(frame, fault)| fault.or_else(|| blurred(frame))).collect()
+    let reach = LEAST_REACH.max(sound.len() / FILM_PER_REACH);
+    let mut faults = posed;
+    for (at, &i) in sound.iter().enumerate() {
+        let around = &sound[at.saturating_sub(reach)..(at + reach + 1).min(sound.len())];
+        let least = least_anywhere.max(options.min_sharpness * sharp(around));
+        if frames[i].sharpness < least || frames[i].blur_px.is_some_and(|blur| blur > most_blur) {
+            faults[i] = Some(DropReason::Blurred);
+        }
+    }
+    faults
 }
 
 /// The viewpoint, where its numbers mean one.

@@ -61,6 +61,22 @@ fn half_the_frames_blurred_leaves_the_sharp_half() {
 }
 
 #[test]
+fn a_side_with_little_detail_is_not_blurred() {
+    let mut frames = film((0..72).map(|i| 5.0 * f64::from(i)));
+    frames.iter_mut().enumerate().for_each(|(i, f)| f.sharpness = 0.6 + 0.4 * (TAU * i as f64 / 72.0).cos());
+    assert_eq!(choose(&frames).kept.len(), 72);
+}
+
+#[test]
+fn a_long_blurred_stretch_is_left_out() {
+    let mut frames = film((0..144).map(|i| 2.5 * f64::from(i)));
+    frames[40..70].iter_mut().for_each(|f| f.sharpness = 0.05);
+    let choice = choose(&frames);
+    assert!((40..70).all(|i| reason(&choice, i) == Some(DropReason::Blurred)));
+    assert_eq!(choice.gaps.len(), 1);
+}
+
+#[test]
 fn measured_blur_rules_out_unless_all_frames_have_it() {
     let mut frames = film((0..72).map(|i| 5.0 * f64::from(i)));
     frames.iter_mut().for_each(|f| f.blur_px = Some(0.3));

@@ -16,7 +16,7 @@ pub use page::html;
 pub use thumbnail::{Overlay, Thumbnail};
 pub use verdict::Grade;
 
-use capture::choose::{DropReason, Gap, PoseSource};
+use capture::choose::{Choice, DropReason, Gap, PoseSource};
 use capture::light::LightCheck;
 use serde::Serialize;
 
@@ -192,6 +192,14 @@ pub enum Severity {
     Warning,
     /// Good to know.
     Note,
+}
+
+impl Coverage {
+    /// As frames were chosen, with `up` towards the zenith.
+    pub fn of(choice: &Choice, up: [f64; 3]) -> Self {
+        let (turns, is_closed, step_deg) = (choice.turns, choice.is_closed, choice.step_deg);
+        Self { turns, is_closed, step_deg, gaps: choice.gaps.clone(), up }
+    }
 }
 
 impl FootageReport {

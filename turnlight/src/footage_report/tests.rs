@@ -100,7 +100,7 @@ fn gaps_and_findings_lower_the_grade_and_say_what_to_do() {
     assert_eq!(report.verdict()[2], "Film again between 120° and 180°.");
     report.findings.push(Finding { severity: Severity::Fault, text: "The camera moved.".to_owned() });
     assert_eq!(report.grade(), Grade::Unusable);
-    assert_eq!(report.verdict()[0], "This footage makes no capture: 12 of 12 frames can be used.");
+    assert_eq!(report.verdict()[0], "This footage makes no capture as it is, though 12 of 12 frames have cameras.");
     assert_eq!(report.verdict()[2], "The camera moved.");
 }
 
@@ -172,6 +172,16 @@ fn footage_that_gave_nothing_has_a_page_too() {
     let page = html(&nothing, &[]);
     assert!(page.contains("makes no capture: 0 of 1 stills") && page.contains("Put a board under the object."));
     assert_eq!(html(&FootageReport { frames: Vec::new(), ..nothing.clone() }, &[]).matches("<tr>").count(), 1);
+}
+
+#[test]
+fn free_hand_footage_is_drawn_where_the_camera_was() {
+    let carried = FootageReport { motion: FootageMotion::FreeHand, axis: None, ..report() };
+    let page = html(&carried, &[]);
+    // Frame 3 was turned by 90°; its camera was at −y, half as high as far.
+    assert!(page.contains("frame 3: 270.0°, 26.6° up"), "direction, not turn");
+    assert!(html(&report(), &[]).contains("frame 3: 90.0°, 26.6° up"));
+    assert!(carried.verdict()[0].contains("carried all around"));
 }
 
 #[test]

@@ -75,7 +75,10 @@ fn usability(report: &FootageReport) -> String {
     let (kept, all) = (report.kept().count(), report.frames.len());
     let what = if report.is_stills() { "stills" } else { "frames" };
     match report.grade() {
-        Grade::Unusable => format!("This footage makes no capture: {kept} of {all} {what} can be used."),
+        Grade::Unusable if kept < 2 => format!("This footage makes no capture: {kept} of {all} {what} can be used."),
+        Grade::Unusable => {
+            format!("This footage makes no capture as it is, though {kept} of {all} {what} have cameras.")
+        }
         _ => format!("{kept} of {all} {what} make the capture, {}.", covered(report)),
     }
 }
