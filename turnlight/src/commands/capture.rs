@@ -32,7 +32,7 @@ pub(crate) fn run(args: &CaptureFootageArgs, observer: &dyn Observer) -> Result<
         args.output.display(),
         args.output.join("report.html").display()
     );
-    let mut json = json!(report);
+    let mut json = report.json();
     json["capture"] = json!(args.output);
     json["views"] = json!(views);
     if let Some(model) = &model {

@@ -141,7 +141,7 @@ impl CapturedFootage {
     /// As [`Capture::write`].
     pub fn write(&self, report: &FootageReport, output: &Path) -> Result<(), Error> {
         let html = footage_report::html(report, &self.thumbnails()?);
-        let json = serde_json::to_string_pretty(report).map_err(|e| Error::Failed(format!("the report: {e}")))?;
+        let json = format!("{:#}\n", report.json());
         Ok(self.capture.write_with_report(&self.mattes(), &html, &json, output)?)
     }
 }

@@ -7,7 +7,7 @@ use crate::footage_report::{
     Measured, Overlay, Severity, Thumbnail,
 };
 use capture::calibrate::{Calibration, LensParameter, LensTerm, Source};
-use capture::choose::{DropReason, Gap};
+use capture::choose::DropReason;
 use capture::footage::Footage;
 use capture::silhouette::Evidence;
 use nalgebra::Point3;
@@ -62,7 +62,8 @@ impl CapturedFootage {
     /// Where a picture was removed meanwhile.
     pub fn thumbnails(&self) -> Result<Vec<Thumbnail>, Error> {
         use rayon::prelude::*;
-        let overlay = Overlay::of_box(self.capture.aabb);
+        let cameras = self.capture.frames.iter().map(|frame| &frame.camera);
+        let overlay = Overlay::of_box(self.capture.aabb).cut_to_box(cameras);
         let thumbnail = |(&at, frame): (&usize, &capture::Frame)| {
             Thumbnail::new(&self.picture(at)?, &self.silhouettes.mattes[at], &frame.camera, &overlay)
         };
@@ -116,23 +117,10 @@ impl CapturedFootage {
         self.capture.aabb.map_or_else(Point3::origin, |aabb| aabb.center())
     }
 
-    /// Of the ring with the most frames; all of them have to be closed.
+    /// Of the ring with the most frames.
     fn coverage(&self) -> Coverage {
-        let rings = &self.selected.rings;
-        let widest = rings.iter().max_by_key(|ring| ring.kept.len());
-        Coverage {
-            turns: widest.and_then(|ring| ring.turns),
-            is_closed: widest.is_some_and(|ring| ring.is_closed),
-            step_deg: widest.and_then(|ring| ring.step_deg),
-            gaps: self.gaps(),
-            up: [0.0, 0.0, 1.0],
-        }
-    }
-
-    /// Directions that no ring shows.
-    fn gaps(&self) -> Vec<Gap> {
         let widest = self.selected.rings.iter().max_by_key(|ring| ring.kept.len());
-        widest.map(|ring| ring.gaps.clone()).unwrap_or_default()
+        widest.map(|ring| Coverage::of(ring, [0.0, 0.0, 1.0])).unwrap_or_default()
     }
 
     fn lens(&self, calibration: &Calibration) -> LensReport {
@@ -193,7 +181,8 @@ impl CapturedFootage {
     }
 
     fn film_again(&self) -> Vec<String> {
-        let mut again: Vec<String> = self.gaps().iter().map(|gap| format!("The side {gap} is not shown.")).collect();
+        let gaps = self.coverage().gaps;
+        let mut again: Vec<String> = gaps.iter().map(|gap| format!("The side {gap} is not shown.")).collect();
         let advice = self.shots.calibration.as_ref().map(|c| c.lens.advice.as_str()).unwrap_or_default();
         if !advice.is_empty() {
             again.push(advice.to_owned());
