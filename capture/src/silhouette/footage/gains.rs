@@ -98,16 +98,16 @@ fn scaled(light: Vec<Option<[f32; 3]>>, gain: &[f64; 3]) -> Vec<Option<[f32; 3]>
 /// ratios to the usual colour, twice.
 fn alike(observed: &[Vec<Option<[f32; 3]>>]) -> Vec<[f64; 3]> {
     let mut gains = vec![[1.0; 3]; observed.len()];
-    for _ in 0..3 {
+    for _ in 0..4 {
         let evened: Vec<_> = observed.iter().zip(&gains).map(|(row, gain)| scaled(row.clone(), gain)).collect();
-        let usual = usual(&evened, LEAST_FRAMES.min(observed.len()));
+        let usual = steady(&evened, usual(&evened, LEAST_FRAMES.min(observed.len())));
         for (row, gain) in evened.iter().zip(&mut gains) {
             for c in 0..3 {
                 let ratios = row.iter().zip(&usual).filter_map(|(o, u)| Some(u.as_ref()?[c] / o.as_ref()?[c]));
                 // A ratio that far off is another thing.
                 let mut ratios: Vec<f32> = ratios.filter(|r| (0.4..2.5).contains(r)).collect();
                 if ratios.len() >= 32 {
-                    gain[c] *= f64::from(centre_of_densest(&mut ratios));
+                    gain[c] *= centre(&mut ratios);
                 }
             }
         }
@@ -115,16 +115,34 @@ fn alike(observed: &[Vec<Option<[f32; 3]>>]) -> Vec<[f64; 3]> {
     gains
 }
 
-/// Mean of the half of the values that lie closest together: what has changed its light for another reason than
-/// the exposure falls away.
-fn centre_of_densest(values: &mut [f32]) -> f32 {
-    values.sort_by(f32::total_cmp);
-    let half = values.len() / 2;
-    let starts = 0..values.len() - half;
-    let width = |s: &usize| values[s + half] - values[*s];
-    let start = starts.min_by(|a, b| width(a).total_cmp(&width(b))).unwrap_or(0);
-    let part = &values[start..=start + half];
-    (part.iter().map(|&v| f64::from(v)).sum::<f64>() / part.len() as f64) as f32
+/// The half of the places that look most alike in all rows.
+fn steady(rows: &[Vec<Option<[f32; 3]>>], usual: Vec<Option<[f32; 3]>>) -> Vec<Option<[f32; 3]>> {
+    let deviation = |place: usize| {
+        let middle = usual[place]?[1];
+        let mut gaps: Vec<f32> =
+            rows.iter().filter_map(|row| row[place].map(|p| (p[1] / middle - 1.0).abs())).collect();
+        let half = gaps.len() / 2;
+        (!gaps.is_empty()).then(|| *gaps.select_nth_unstable_by(half, f32::total_cmp).1)
+    };
+    let deviations: Vec<Option<f32>> = (0..usual.len()).map(deviation).collect();
+    let mut sorted: Vec<f32> = deviations.iter().copied().flatten().collect();
+    sorted.sort_by(f32::total_cmp);
+    let Some(&limit) = sorted.get(sorted.len() / 2) else { return usual };
+    let keep = |(colour, deviation): (Option<[f32; 3]>, &Option<f32>)| {
+        colour.filter(|_| deviation.is_some_and(|d| d <= limit))
+    };
+    usual.into_iter().zip(&deviations).map(keep).collect()
+}
+
+/// Mean of the values near the median: what has changed its light for another reason than the exposure falls away.
+fn centre(values: &mut [f32]) -> f64 {
+    let middle = values.len() / 2;
+    let median = *values.select_nth_unstable_by(middle, f32::total_cmp).1;
+    let mut gaps: Vec<f32> = values.iter().map(|v| (v - median).abs()).collect();
+    // Two standard deviations, were they normal.
+    let reach = 3.0 * *gaps.select_nth_unstable_by(middle, f32::total_cmp).1;
+    let near: Vec<f64> = values.iter().filter(|v| (**v - median).abs() <= reach).map(|&v| f64::from(v)).collect();
+    near.iter().sum::<f64>() / near.len() as f64
 }
 
 /// Per place and channel the median over the rows that see it.

@@ -67,6 +67,9 @@ pub(super) fn agreed(
     resolution: usize,
     dissent: Dissent,
 ) -> Found {
+    // Cells smaller than a pixel know no more.
+    let pixels = parts.iter().map(|p| p.cutout.width.max(p.cutout.height)).max().unwrap_or(0);
+    let resolution = resolution.min(pixels).max(16);
     let hull_of = |without: &[usize]| {
         let voters = parts.iter().enumerate().filter(|(i, _)| !without.contains(i));
         let views: Vec<(&Camera, &Image<u8>)> = voters.map(|(_, p)| (&p.camera, &p.matte)).collect();
@@ -107,7 +110,7 @@ fn outliers(agreement: &[f64]) -> Vec<usize> {
 }
 
 /// Intersection over union of the objects (≥ 128); 0 where there is neither.
-fn iou(a: &Image<u8>, b: &Image<u8>) -> f64 {
+pub(super) fn iou(a: &Image<u8>, b: &Image<u8>) -> f64 {
     let both = a.pixels().iter().zip(b.pixels()).map(|(&a, &b)| (a >= 128, b >= 128));
     let (and, or) = both.fold((0, 0), |(and, or), (a, b)| (and + usize::from(a && b), or + usize::from(a || b)));
     and as f64 / or.max(1) as f64
@@ -141,7 +144,8 @@ fn findings(found: &Found) -> Vec<String> {
         return findings;
     }
     let empty = frames(&|_, p| !p.matte.pixels().iter().any(|&v| v >= 128));
-    let unseparated = frames(&|i, p| p.unseparated > LARGEST_UNSEPARATED && !empty.contains(&i));
+    let is_judged = |i: usize| !empty.contains(&i) && !found.contradicting.contains(&i);
+    let unseparated = frames(&|i, p| p.unseparated > LARGEST_UNSEPARATED && is_judged(i));
     if !unseparated.is_empty() {
         findings.push(format!(
             "the backdrop has the colour of the object in frames {}: its edge there is guessed from the others; \

@@ -25,6 +25,8 @@ mod rim;
 mod rounds;
 mod shade;
 mod stage;
+#[cfg(test)]
+mod tests;
 
 pub use judgement::check_silhouettes;
 pub use stage::{FetchFrame, StageSetup};

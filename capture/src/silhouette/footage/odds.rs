@@ -22,6 +22,9 @@ const LIGHT_ERROR: f32 = 0.03;
 /// The least of what is left of the (encoded) light in shadow.
 const DEEPEST_SHADOW: f32 = 0.35;
 
+/// Of the light that a shadow takes: what the object beside it throws back in its own colour.
+const SHADOW_TINT: f32 = 0.1;
+
 /// Odds of one pixel are not trusted beyond this: neighbours share their errors.
 const LARGEST: f32 = 8.0;
 
@@ -65,8 +68,8 @@ pub(super) fn of(
             let in_room = room.map(|r| r.at(x, y)).filter(|c| known(c) && !is_covered);
             let Some(behind) = on_target.filter(known).or(in_room) else {
                 let colour = picture.at(x, y);
-                let odds = palettes.object.log_density(&colour) - palettes.surroundings.log_density(&colour);
-                log_odds.set(x, y, (odds + COVERED).clamp(-LARGEST_BY_COLOUR, LARGEST_BY_COLOUR));
+                let odds = palettes.log_odds(&colour) + COVERED;
+                log_odds.set(x, y, odds.clamp(-LARGEST_BY_COLOUR, LARGEST_BY_COLOUR));
                 continue;
             };
             let colour = picture.at(x, y);
@@ -83,13 +86,17 @@ fn log_density(colour: &[f32; 3], behind: &Cluster) -> f32 {
     let b = behind.colour;
     let length = (b[0] * b[0] + b[1] * b[1] + b[2] * b[2]).sqrt();
     let sigma = (behind.spread.powi(2) + NOISE.powi(2) + (LIGHT_ERROR * length * 0.58).powi(2)).sqrt();
-    let squares = |factor: f32| (0..3).map(|c| (colour[c] - factor * b[c]).powi(2)).sum::<f32>() / (sigma * sigma);
+    let squares = |factor: f32| (0..3).map(|c| (colour[c] - factor * b[c]).powi(2)).sum::<f32>();
     // ln √(2π)
-    let gauss = |squares: f32, dimensions: f32| -0.5 * squares - dimensions * (sigma.ln() + 0.919);
-    let lit = 0.85_f32.ln() + gauss(squares(1.0), 3.0);
+    let gauss = |squares: f32, sigma: f32, dimensions: f32| {
+        -0.5 * squares / (sigma * sigma) - dimensions * (sigma.ln() + 0.919)
+    };
+    let lit = 0.85_f32.ln() + gauss(squares(1.0), sigma, 3.0);
     let along = (0..3).map(|c| colour[c] * b[c]).sum::<f32>() / (length * length).max(1.0);
-    let shadow_length = (1.0 - DEEPEST_SHADOW) * length.max(1.0);
-    let in_shadow = gauss(squares(along.clamp(DEEPEST_SHADOW, 1.0)), 2.0) - shadow_length.max(2.5 * sigma).ln();
+    let factor = along.clamp(DEEPEST_SHADOW, 1.0);
+    let shadow_sigma = sigma.hypot(SHADOW_TINT * (1.0 - factor) * length);
+    let shadow_length = ((1.0 - DEEPEST_SHADOW) * length).max(2.5 * sigma);
+    let in_shadow = gauss(squares(factor), shadow_sigma, 2.0) - shadow_length.ln();
     let anything = 0.02_f32.ln() - 3.0 * 256.0_f32.ln();
     lit.max(0.13_f32.ln() + in_shadow).max(anything)
 }

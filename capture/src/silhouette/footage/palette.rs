@@ -53,6 +53,11 @@ impl Palettes {
     pub(super) fn anything() -> Self {
         Self { object: Palette::anything(), surroundings: Palette::anything() }
     }
+
+    /// Natural logarithm of the odds that a colour is the object's.
+    pub(super) fn log_odds(&self, colour: &[f32; 3]) -> f32 {
+        self.object.log_density(colour) - self.surroundings.log_density(colour)
+    }
 }
 
 fn bin(colour: &[f32; 3]) -> usize {

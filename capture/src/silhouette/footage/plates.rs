@@ -4,6 +4,7 @@ use super::cloth::Cloth;
 use super::cluster::{self, Cluster};
 use super::light::Toned;
 use super::optics::{Cutout, Directions, on_plane};
+use super::palette::Palettes;
 use super::shade::Shade;
 use crate::{Aabb, Camera, Image};
 use nalgebra::Point3;
@@ -17,6 +18,9 @@ const LARGEST_SPREAD: f32 = 40.0;
 
 /// Views of a place on the target that must agree.
 const LEAST_SUPPORT: u8 = 3;
+
+/// Log odds by colour from which on a place beside the hull is the object, not the target.
+const SUSPICIOUS: f32 = 2.0;
 
 /// A frame that makes plates.
 #[derive(Debug)]
@@ -91,7 +95,7 @@ pub(super) struct TargetPlate {
 
 impl TargetPlate {
     /// Of the part of the plane that is seen behind and below `bounds`. `None` where no frame sees any.
-    pub(super) fn of(frames: &[PlateFrame], bounds: &Aabb) -> Option<Self> {
+    pub(super) fn of(frames: &[PlateFrame], bounds: &Aabb, palettes: &Palettes) -> Option<Self> {
         let footprints: Vec<[f64; 2]> = frames.iter().flat_map(|f| shadow_of(bounds, &f.camera)).collect();
         let area = Aabb::around(footprints.iter().map(|p| Point3::new(p[0], p[1], 0.0)))?;
         // Rays near the horizon reach far: no further than three times the object's box.
@@ -111,11 +115,11 @@ impl TargetPlate {
         let count = |axis: usize| ((max[axis] - min[axis]) / texel).ceil().max(1.0) as usize;
         let (width, height) = (count(0), count(1));
         let mut plate = Self { origin: min, texel, texture: Image::filled(width, height, Cluster::default()) };
-        plate.texture = plate.looked_up(frames, None);
+        plate.texture = plate.looked_up(frames, None, palettes);
         if frames.iter().any(|f| f.segment.is_some()) {
             // The light stays in the room while the target turns under it.
             let shades: Vec<Shade> = frames.par_iter().map(|f| plate.shade(f)).collect();
-            plate.texture = plate.looked_up(frames, Some(&shades));
+            plate.texture = plate.looked_up(frames, Some(&shades), palettes);
         }
         Some(plate)
     }
@@ -169,7 +173,7 @@ impl TargetPlate {
         Image::from_pixels(width, height, pixels).unwrap_or_default()
     }
 
-    fn looked_up(&self, frames: &[PlateFrame], shades: Option<&[Shade]>) -> Image<Cluster> {
+    fn looked_up(&self, frames: &[PlateFrame], shades: Option<&[Shade]>, palettes: &Palettes) -> Image<Cluster> {
         let (width, height) = (self.texture.width(), self.texture.height());
         let texel = |samples: &mut Vec<[f32; 3]>, at: usize| {
             let x = self.origin[0] + ((at % width) as f64 + 0.5) * self.texel;
@@ -193,6 +197,10 @@ impl TargetPlate {
                 return Cluster::COVERED;
             }
             let found = cluster::densest(samples).unwrap_or_default();
+            // The object itself, where the hull so far is too small.
+            if hidden > 0 && palettes.log_odds(&found.colour) > SUSPICIOUS {
+                return Cluster::COVERED;
+            }
             // Less than a third of the views is no agreement.
             if 3 * usize::from(found.support) < samples.len() { Cluster::default() } else { found }
         };

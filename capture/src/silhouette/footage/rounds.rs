@@ -153,7 +153,8 @@ impl Scene<'_> {
         let frames: Vec<_> =
             chosen.par_iter().map(|&i| self.plate_frame(i, hull.as_ref(), cutouts[i], round)).collect();
         let frames: Vec<PlateFrame> = frames.into_iter().collect::<Result<_, _>>()?;
-        let target = if self.setup.has_plane { TargetPlate::of(&frames, &belief.bounds) } else { None };
+        let target =
+            if self.setup.has_plane { TargetPlate::of(&frames, &belief.bounds, &belief.palettes) } else { None };
         let room = |segment: usize| {
             let members: Vec<&PlateFrame> = frames.iter().filter(|f| f.segment == Some(segment)).collect();
             let seen = (0..count).filter(|&i| self.setup.segments[i] == Some(segment)).map(|i| cutouts[i]);

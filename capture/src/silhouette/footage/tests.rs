@@ -1,0 +1,310 @@
+//! A ball on a chequered target, seen by a camera whose truth is known.
+
+use super::light::{encoded, linear};
+use super::*;
+use crate::{Camera, Distortion, Intrinsics};
+use nalgebra::{Matrix3, Point2, Point3, Vector3};
+
+const SIZE: (usize, usize) = (128, 96);
+const FRAMES: usize = 20;
+
+#[derive(Clone, Copy)]
+struct Stage {
+    center: Point3<f64>,
+    radius: f64,
+    albedo: [f64; 3],
+    /// The target is round; beyond it a turning stage shows cloth, a still one the desk.
+    board: f64,
+    is_turning: bool,
+    /// Off the middle of the frame, pixels.
+    principal: [f64; 2],
+    k1: f64,
+}
+
+impl Stage {
+    fn new(is_turning: bool) -> Self {
+        let center = Point3::new(0.4, 0.1, 1.0);
+        Self { center, radius: 1.0, albedo: [0.7, 0.08, 0.06], board: 3.0, is_turning, principal: [0.0; 2], k1: 0.0 }
+    }
+
+    fn camera(&self, angle: f64) -> Camera {
+        let eye = Point3::new(7.0 * angle.cos(), 7.0 * angle.sin(), 5.0);
+        let forward = (Point3::new(0.0, 0.0, 0.7) - eye).normalize();
+        let right = forward.cross(&Vector3::z()).normalize();
+        let rotation = Matrix3::from_rows(&[right.transpose(), forward.cross(&right).transpose(), forward.transpose()]);
+        let intrinsics = Intrinsics {
+            fx: 152.0,
+            fy: 152.0,
+            skew: 0.0,
+            cx: 64.0 + self.principal[0],
+            cy: 48.0 + self.principal[1],
+            distortion: Distortion { k1: self.k1, ..Distortion::default() },
+            width: SIZE.0,
+            height: SIZE.1,
+        };
+        Camera { intrinsics, rotation, translation: -(rotation * eye.coords) }
+    }
+
+    fn cameras(&self) -> Vec<Camera> {
+        (0..FRAMES).map(|i| self.camera(std::f64::consts::TAU * i as f64 / FRAMES as f64)).collect()
+    }
+
+    /// Towards the light: in the room, which a turning stage turns against.
+    fn light(&self, camera: &Camera) -> Vector3<f64> {
+        let in_room = Vector3::new(-0.5, -0.7, -0.4).normalize();
+        let turned = camera.rotation.tr_mul(&in_room);
+        if self.is_turning { turned } else { Vector3::new(0.3, -0.4, 0.85).normalize() }
+    }
+
+    /// Linear light along a ray, and whether it is the ball's.
+    fn trace(&self, camera: &Camera, pixel: Point2<f64>) -> ([f64; 3], bool) {
+        let ray = camera.ray(pixel).unwrap();
+        let light = self.light(camera);
+        if let Some(t) = self.hit(&ray.origin, &ray.direction) {
+            let normal = (ray.origin + ray.direction * t - self.center) / self.radius;
+            let shade = 0.25 + 0.75 * normal.dot(&light).max(0.0);
+            return (self.albedo.map(|a| a * shade), true);
+        }
+        let t = -ray.origin.z / ray.direction.z;
+        let place = ray.origin + ray.direction * t;
+        let is_on_board = t > 0.0 && place.coords.norm() < self.board;
+        if self.is_turning && !is_on_board {
+            let uneven = 0.6 + 0.3 * pixel.x / SIZE.0 as f64 + 0.2 * (pixel.y / SIZE.1 as f64).powi(2);
+            return ([0.03, 0.3, 0.06].map(|c| c * uneven), false);
+        }
+        let lit = if self.hit(&place, &light).is_some() { 0.55 } else { 1.0 };
+        let is_white = (place.x.mul_add(1.4, 100.0) as i64 + place.y.mul_add(1.4, 100.0) as i64) % 2 == 0;
+        let colour = match (is_on_board, is_white) {
+            (true, true) => [0.75, 0.74, 0.7],
+            (true, false) => [0.03; 3],
+            (false, _) => [0.3, 0.22, 0.15],
+        };
+        (colour.map(|c| c * lit), false)
+    }
+
+    fn hit(&self, origin: &Point3<f64>, direction: &Vector3<f64>) -> Option<f64> {
+        let to = origin - self.center;
+        let b = to.dot(direction);
+        let discriminant = b * b - to.norm_squared() + self.radius * self.radius;
+        let t = -b - discriminant.sqrt();
+        (t > 1e-9).then_some(t)
+    }
+
+    /// A frame with a little noise, and the coverage by the ball.
+    fn shot(&self, camera: &Camera, gains: [f64; 3]) -> (Image<[u8; 3]>, Image<u8>) {
+        let mut picture = Image::filled(SIZE.0, SIZE.1, [0; 3]);
+        let mut truth = Image::filled(SIZE.0, SIZE.1, 0);
+        for y in 0..SIZE.1 {
+            for x in 0..SIZE.0 {
+                let mut sum = [0.0; 3];
+                let mut covered = 0;
+                for k in 0..9 {
+                    let at = |v: usize, k: usize| v as f64 + (k as f64 + 0.5) / 3.0;
+                    let (light, is_ball) = self.trace(camera, Point2::new(at(x, k % 3), at(y, k / 3)));
+                    (0..3).for_each(|c| sum[c] += light[c] / 9.0);
+                    covered += usize::from(is_ball);
+                }
+                let noise =
+                    |c: usize| ((x * 7919 + y * 104_729 + c * 31 + (camera.translation.x * 1e6) as usize) % 5) as f32;
+                let level = |c: usize| encoded((sum[c] * gains[c]) as f32) + noise(c) - 2.0;
+                picture.set(x, y, [0, 1, 2].map(|c| level(c).round().clamp(0.0, 255.0) as u8));
+                truth.set(x, y, (covered * 255 / 9) as u8);
+            }
+        }
+        (picture, truth)
+    }
+
+    fn setup(&self) -> StageSetup {
+        let segment = if self.is_turning { Some(0) } else { None };
+        StageSetup {
+            cameras: self.cameras(),
+            segments: vec![segment; FRAMES],
+            has_plane: true,
+            ..StageSetup::default()
+        }
+    }
+
+    fn shots(&self) -> (Vec<Image<[u8; 3]>>, Vec<Image<u8>>) {
+        self.cameras().par_iter().map(|c| self.shot(c, [1.0; 3])).unzip()
+    }
+}
+
+fn found(pictures: &[Image<[u8; 3]>], setup: &StageSetup) -> Silhouettes {
+    find_silhouettes(&|i| Ok(pictures[i].clone()), setup, &SilhouetteOptions::default()).unwrap()
+}
+
+fn ious(found: &Silhouettes, truth: &[Image<u8>]) -> Vec<f64> {
+    found.mattes.iter().zip(truth).map(|(a, b)| judgement::iou(a, b)).collect()
+}
+
+fn least(values: &[f64]) -> f64 {
+    values.iter().copied().fold(1.0, f64::min)
+}
+
+#[test]
+fn a_ball_on_a_board_is_found_by_a_hand_held_camera() {
+    let stage = Stage::new(false);
+    let (pictures, truth) = stage.shots();
+    let found = found(&pictures, &stage.setup());
+    let ious = ious(&found, &truth);
+    assert!(least(&ious) > 0.96, "{ious:?}");
+    assert!(least(&found.agreement) > 0.93, "{:?}", found.agreement);
+    assert_eq!((found.contradicting, found.findings), (Vec::<usize>::new(), Vec::<String>::new()));
+}
+
+#[test]
+fn a_ball_on_a_platter_is_found_before_uneven_cloth() {
+    let stage = Stage::new(true);
+    let (pictures, truth) = stage.shots();
+    let found = found(&pictures, &stage.setup());
+    let ious = ious(&found, &truth);
+    assert!(least(&ious) > 0.96, "{ious:?}");
+    assert!(found.contradicting.is_empty(), "{:?}", found.agreement);
+    let bounds = found.aabb.unwrap();
+    assert!((bounds.max.z - 2.0).abs() < 0.15 && bounds.min.z == 0.0, "{bounds:?}");
+}
+
+#[test]
+fn gains_come_back_to_half_a_percent() {
+    for is_turning in [false, true] {
+        let stage = Stage::new(is_turning);
+        let setup = stage.setup();
+        let given = |i: usize| [1.0 + 0.1 * (i as f64).sin(), 1.0, 1.0 - 0.05 * (1.7 * i as f64).sin()];
+        let pictures: Vec<_> = setup.cameras.par_iter().enumerate().map(|(i, c)| stage.shot(c, given(i)).0).collect();
+        let thumbnails: Vec<_> = pictures.iter().map(|p| light::thumbnail(p, 1)).collect();
+        let bounds = stage::search_box(&setup).unwrap();
+        let gains = gains::find(&thumbnails, &setup.cameras, &setup, Some(&bounds));
+        for c in 0..3 {
+            let products: Vec<f64> = (0..FRAMES).map(|i| gains[i][c] * given(i)[c]).collect();
+            let mean = products.iter().sum::<f64>() / FRAMES as f64;
+            for p in &products {
+                assert!((p / mean - 1.0).abs() < 0.005, "channel {c}, turning {is_turning}: {products:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_wrong_camera_and_an_empty_frame_are_named() {
+    let stage = Stage::new(true);
+    let (mut pictures, _) = stage.shots();
+    let mut setup = stage.setup();
+    setup.cameras[5] = stage.camera(3.0);
+    let gone = Stage { center: Point3::new(0.0, 0.0, -50.0), ..stage };
+    pictures[13] = gone.shot(&setup.cameras[13], [1.0; 3]).0;
+    let found = found(&pictures, &setup);
+    assert_eq!(found.contradicting, vec![5, 13], "{:?}", found.agreement);
+    assert!(found.findings.iter().any(|f| f.contains("frames 5 contradict")), "{:?}", found.findings);
+}
+
+#[test]
+fn the_frame_does_not_carve_what_it_cuts() {
+    let stage = Stage { principal: [44.0, 0.0], k1: -0.05, ..Stage::new(true) };
+    let (pictures, truth) = stage.shots();
+    assert!(truth.iter().any(crate::load::touches_border));
+    let found = found(&pictures, &stage.setup());
+    let ious = ious(&found, &truth);
+    assert!(least(&ious) > 0.94, "{ious:?}");
+}
+
+#[test]
+fn a_ball_of_the_cloths_colour_is_not_found_and_that_is_said() {
+    let stage = Stage { albedo: [0.03, 0.3, 0.06], board: 0.0, ..Stage::new(true) };
+    let (pictures, _) = stage.shots();
+    let found = found(&pictures, &StageSetup { has_plane: false, ..stage.setup() });
+    assert!(!found.findings.is_empty());
+}
+
+#[test]
+fn without_target_and_still_camera_the_backdrop_decides() {
+    let stage = Stage { board: 0.0, ..Stage::new(true) };
+    let (pictures, truth) = stage.shots();
+    let setup = StageSetup { has_plane: false, segments: vec![None; FRAMES], ..stage.setup() };
+    let found = found(&pictures, &setup);
+    assert_eq!(found.evidence, Evidence::Backdrop);
+    let ious = ious(&found, &truth);
+    assert!(least(&ious) > 0.9, "{ious:?}");
+}
+
+#[test]
+fn given_silhouettes_are_judged() {
+    let stage = Stage::new(true);
+    let (_, mut truth) = stage.shots();
+    truth[7] = truth[7].map(|v| 255 - v);
+    let judged = check_silhouettes(&truth, &stage.setup()).unwrap();
+    assert_eq!(judged.contradicting, vec![7], "{:?}", judged.agreement);
+    assert_eq!(judged.mattes, truth);
+    let empty = vec![Image::filled(SIZE.0, SIZE.1, 0); FRAMES];
+    assert!(check_silhouettes(&empty, &stage.setup()).unwrap().aabb.is_none());
+}
+
+#[test]
+fn faults_of_the_setup_are_named() {
+    let stage = Stage::new(true);
+    let fetch = |_: usize| Ok(Image::filled(SIZE.0, SIZE.1, [0; 3]));
+    let short = StageSetup { segments: vec![None], ..stage.setup() };
+    let error = find_silhouettes(&fetch, &short, &SilhouetteOptions::default()).unwrap_err();
+    assert!(error.to_string().contains("20 cameras for 1 segments"), "{error}");
+    let plate = Some(Image::filled(10, 10, [0; 3]));
+    let small = StageSetup { clean_plates: vec![plate], ..stage.setup() };
+    let error = find_silhouettes(&fetch, &small, &SilhouetteOptions::default()).unwrap_err();
+    assert!(error.to_string().contains("the clean plate of segment 0 is 10x10"), "{error}");
+}
+
+#[test]
+fn black_frames_and_no_frames_have_an_answer() {
+    let stage = Stage::new(true);
+    let black = vec![Image::filled(SIZE.0, SIZE.1, [0; 3]); FRAMES];
+    let answer = found(&black, &stage.setup());
+    assert_eq!(answer.mattes.len(), FRAMES);
+    assert!(!answer.findings.is_empty());
+    assert!(found(&[], &StageSetup::default()).mattes.is_empty());
+}
+
+#[test]
+fn the_number_of_threads_changes_nothing() {
+    let stage = Stage::new(true);
+    let (pictures, _) = stage.shots();
+    let with = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| found(&pictures, &stage.setup()))
+    };
+    let (one, three) = (with(1), with(3));
+    assert_eq!((one.mattes, one.agreement, one.gains), (three.mattes, three.agreement, three.gains));
+}
+
+/// A straight edge at a known place within the pixel: the coverage in linear light, not in encoded levels.
+#[test]
+fn coverage_at_the_rim_is_linear_in_light() {
+    for part in [0.1, 0.3, 0.5, 0.8] {
+        let (object, cloth) = ([0.6, 0.3, 0.2], [0.05, 0.4, 0.1]);
+        let level = |alpha: f32| [0, 1, 2].map(|c| encoded(alpha * object[c] + (1.0 - alpha) * cloth[c]).round() as u8);
+        let mut picture = Image::filled(24, 24, level(0.0));
+        let mut mask = Image::filled(24, 24, 0);
+        for y in 0..24 {
+            (0..10).for_each(|x| picture.set(x, y, level(1.0)));
+            (0..10).for_each(|x| mask.set(x, y, 255));
+            picture.set(10, y, level(part));
+        }
+        let behind = Image::filled(24, 24, Some(cloth.map(encoded)));
+        let matte = rim::refined(&light::Toned::new(picture, &[1.0; 3]), &behind, &mask);
+        let coverage = f32::from(matte.at(10, 12)) / 255.0;
+        assert!((coverage - part).abs() < 0.02, "{coverage} for {part}");
+    }
+}
+
+#[test]
+fn the_usual_colour_outvotes_a_changing_occluder() {
+    let mut samples: Vec<[f32; 3]> = (0..14).map(|i| [15.0 * i as f32, 30.0, 200.0 - 14.0 * i as f32]).collect();
+    samples.extend([[90.0, 92.0, 91.0]; 6]);
+    let found = cluster::densest(&samples).unwrap();
+    assert!((found.colour[1] - 92.0).abs() < 2.0 && found.support >= 6, "{found:?}");
+    assert!(cluster::densest(&[]).is_none());
+}
+
+#[test]
+fn linear_light_and_levels_are_inverse() {
+    for level in [0.0, 5.0, 10.3, 128.0, 255.0] {
+        assert!((encoded(linear(level)) - level).abs() < 1e-3);
+    }
+}
