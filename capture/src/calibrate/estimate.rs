@@ -8,7 +8,7 @@ use super::lens::LensPrior;
 use super::pose::{Candidate, candidates, choose, plane_near, plane_of};
 use super::rig::{Corner, Picture, Poses, Rig, Shape, Turning};
 use super::turntable::{
-    axis, best_angle, canonical, divided, initial, joined, largest_turn, likeliest_move, world_from_target,
+    axis, best_angle, canonical, initial, joined, largest_turn, likeliest_move, starts, world_from_target,
 };
 use super::{CalibrateError, CalibrateOptions, LensKnowledge, LensParameter, MotionKind, Source, Target, layout, lens};
 use crate::Intrinsics;
@@ -235,15 +235,19 @@ impl Estimate {
         };
         let world = world_from_target(&axis, self.plane.as_ref(), &points);
         let reach = points.iter().map(|p| (p - axis.point).norm()).fold(0.0, f64::max);
-        let turning = initial(&axis, world, poses, &self.pictures, self.rig.lens.fx, reach);
-        let mut tried = self.copy();
-        tried.rig.poses = Poses::Turning(turning);
-        let is_good = tried.settle().is_ok() && {
-            tried.find_moves();
-            tried.join_moves();
-            tried.fit.rms_px() <= (WORSE * self.fit.rms_px()).max(self.fit.rms_px() + WORSE_PX)
-                && tried.used() as f64 >= EXPLAINED * self.used() as f64
+        let about_axis = |starts: &[usize]| {
+            let turning = initial(&axis, world, poses, &self.pictures, reach, starts);
+            let mut next = self.copy();
+            next.rig.poses = Poses::Turning(turning);
+            next.settle().map(|()| next)
         };
+        let starts = starts(&axis, poses, &self.pictures, self.rig.lens.fx, reach);
+        let mut tried = about_axis(&starts)?;
+        tried.rescue();
+        tried.find_moves(starts, about_axis);
+        tried.join_moves();
+        let is_good = tried.fit.rms_px() <= (WORSE * self.fit.rms_px()).max(self.fit.rms_px() + WORSE_PX)
+            && tried.used() as f64 >= EXPLAINED * self.used() as f64;
         if !is_good && is_wanted {
             let (rms_px, free_px) = (tried.fit.rms_px(), self.fit.rms_px());
             return Err(CalibrateError::NotATurntable { rms_px, free_px });
@@ -259,18 +263,13 @@ impl Estimate {
         used().any(|pose| (pose.translation.vector - first.translation.vector).norm() > 0.02 * distance)
     }
 
-    /// Looks for angles of pictures left out, and for places where the camera was moved, as long as that helps.
-    fn find_moves(&mut self) {
-        self.rescue();
+    /// Looks for places where the camera was moved, as long as that helps. Each time all is begun anew from the free
+    /// poses, since one camera where there were two bends the lens.
+    fn find_moves(&mut self, mut starts: Vec<usize>, about_axis: impl Fn(&[usize]) -> Result<Self, CalibrateError>) {
         for _ in 0..MOST_MOVES {
-            let Poses::Turning(turning) = &self.rig.poses else { return };
-            let Some((segment, at)) = likeliest_move(&self.rig, &self.pictures, self.fit.noise) else { return };
-            let mut next = self.copy();
-            next.rig.poses = Poses::Turning(divided(turning, &self.pictures, segment, at));
-            next.pictures.iter_mut().for_each(|p| p.is_used = !p.corners.is_empty());
-            if next.settle().is_err() {
-                return;
-            }
+            let Some(at) = likeliest_move(&self.rig, &self.pictures, self.fit.noise) else { return };
+            starts.push(at);
+            let Ok(mut next) = about_axis(&starts) else { return };
             next.rescue();
             let is_better = next.used() > self.used() || next.fit.rms_px() < 0.95 * self.fit.rms_px();
             if !is_better {

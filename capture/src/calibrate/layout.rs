@@ -1,7 +1,7 @@
 //! A first guess of where square markers lie in their plane, from pictures of some of them at a time.
 
 use super::homography::{Pair, apply, fit_robust, median};
-use super::rig::{Picture, flat_place, square_corner, unit_corner};
+use super::rig::{Corner, Picture, flat_place, square_corner, unit_corner};
 use nalgebra::{Isometry3, Matrix3, Point2, Vector2, Vector3};
 
 /// A marker in a picture, all four corners of it.
@@ -55,7 +55,7 @@ pub(super) fn learn(pictures: &[Picture], count: usize, side: f64) -> (Vec<Optio
 /// Markers of which all four corners are seen.
 fn whole_markers(picture: &Picture) -> Vec<Square> {
     let chunks = picture.corners.chunk_by(|a, b| a.point / 4 == b.point / 4);
-    let whole = |chunk: &[super::rig::Corner]| {
+    let whole = |chunk: &[Corner]| {
         let corners: Vec<Point2<f64>> = chunk.iter().map(|c| c.pixel).collect();
         Some((chunk.first()?.point / 4, corners.try_into().ok()?))
     };

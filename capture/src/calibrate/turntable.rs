@@ -104,14 +104,35 @@ pub(super) fn world_from_target(axis: &Axis, plane: Option<&Isometry3<f64>>, poi
     Isometry3::from_parts(Translation3::identity(), rotation) * Translation3::from(-origin)
 }
 
-/// A platter that turns about the axis, as free poses show it: one segment for each film and each place of the camera.
+/// The pictures from which on a camera stands elsewhere: the first of each film, and those at which the axis jumps, as
+/// free poses show it.
+pub(super) fn starts(
+    axis: &Axis,
+    poses: &[Isometry3<f64>],
+    pictures: &[Picture],
+    focal: f64,
+    reach: f64,
+) -> Vec<usize> {
+    let places: Vec<[f64; 6]> = poses.iter().map(|pose| place(axis, pose, reach)).collect();
+    let mut starts = Vec::new();
+    let mut first = 0;
+    while first < pictures.len() {
+        let length = pictures[first..].iter().take_while(|p| p.film == pictures[first].film).count();
+        starts.push(first);
+        split(&places, pictures, first..first + length, focal, &mut starts);
+        first += length;
+    }
+    starts
+}
+
+/// A platter that turns about the axis, as free poses show it, with a segment from each start.
 pub(super) fn initial(
     axis: &Axis,
     world_from_target: Isometry3<f64>,
     poses: &[Isometry3<f64>],
     pictures: &[Picture],
-    focal: f64,
     reach: f64,
+    starts: &[usize],
 ) -> Turning {
     let places: Vec<[f64; 6]> = poses.iter().map(|pose| place(axis, pose, reach)).collect();
     let mut turning = Turning {
@@ -121,17 +142,11 @@ pub(super) fn initial(
         segment_of: vec![0; pictures.len()],
         angles: vec![0.0; pictures.len()],
     };
-    let mut first = 0;
-    while first < pictures.len() {
-        let length = pictures[first..].iter().take_while(|p| p.film == pictures[first].film).count();
-        let mut starts = vec![first];
-        split(&places, pictures, first..first + length, focal, &mut starts);
-        starts.push(first + length);
-        starts.sort_unstable();
-        for range in starts.windows(2) {
-            add_segment(&mut turning, &places, poses, pictures, range[0]..range[1]);
-        }
-        first += length;
+    let mut bounds = starts.to_vec();
+    bounds.push(pictures.len());
+    bounds.sort_unstable();
+    for range in bounds.windows(2) {
+        add_segment(&mut turning, &places, poses, pictures, range[0]..range[1]);
     }
     turning
 }
@@ -217,7 +232,7 @@ fn angle_about_z(rotation: &UnitQuaternion<f64>) -> f64 {
 
 /// Where a camera was most likely moved in the middle of a segment: by how much a second pose from there on would lower
 /// the squared misfit, by one Gauss–Newton step on robust weights (the score test, Rao 1948). `None` if nowhere by much.
-pub(super) fn likeliest_move(rig: &Rig, pictures: &[Picture], noise: f64) -> Option<(usize, usize)> {
+pub(super) fn likeliest_move(rig: &Rig, pictures: &[Picture], noise: f64) -> Option<usize> {
     let Poses::Turning(turning) = &rig.poses else { return None };
     let scores: Vec<Score> = (0..pictures.len()).map(|k| score(rig, turning, &pictures[k], k, noise)).collect();
     let mut best = (0.0, None);
@@ -231,7 +246,7 @@ pub(super) fn likeliest_move(rig: &Rig, pictures: &[Picture], noise: f64) -> Opt
             let gain = before.gain() + after.gain() - total.gain();
             let is_long = n >= SHORTEST && members.len() - n >= SHORTEST;
             if is_long && gain > best.0 && gain > EXPLAINED * total.cost && gain > LEAST_GAIN * noise * noise {
-                best = (gain, Some((segment, k)));
+                best = (gain, Some(k));
             }
             before = before.plus(scores[k]);
         }
@@ -295,21 +310,6 @@ fn score(rig: &Rig, turning: &Turning, picture: &Picture, k: usize, noise: f64) 
     sum
 }
 
-/// The platter with a camera moved before picture `at`.
-pub(super) fn divided(turning: &Turning, pictures: &[Picture], segment: usize, at: usize) -> Turning {
-    let mut next = turning.clone();
-    let new = next.segments.len();
-    next.segments.push(next.segments[segment]);
-    next.references.push(at);
-    (at..pictures.len()).filter(|&k| turning.segment_of[k] == segment).for_each(|k| next.segment_of[k] = new);
-    for s in [segment, new] {
-        let members = (0..pictures.len()).filter(|&k| next.segment_of[k] == s);
-        let most = members.max_by_key(|&k| (pictures[k].is_used, pictures[k].corners.len(), pictures.len() - k));
-        next.references[s] = most.unwrap_or(at);
-    }
-    next.in_order()
-}
-
 /// The platter without a move of the camera that the corners do not show: one that shifts the target's points by less
 /// than their noise, in pixels. `None` if every move shows.
 pub(super) fn joined(rig: &Rig, turning: &Turning, pictures: &[Picture], noise: f64) -> Option<Turning> {
@@ -337,22 +337,6 @@ pub(super) fn joined(rig: &Rig, turning: &Turning, pictures: &[Picture], noise: 
     next.segments.remove(s + 1);
     next.references.remove(s + 1);
     Some(next)
-}
-
-impl Turning {
-    /// Segments numbered as their pictures come.
-    fn in_order(self) -> Self {
-        let first = |s: usize| self.segment_of.iter().position(|&of| of == s);
-        let mut order: Vec<usize> = (0..self.segments.len()).collect();
-        order.sort_by_key(|&s| first(s));
-        let new = |s: usize| order.iter().position(|&old| old == s).unwrap_or(s);
-        Self {
-            segments: order.iter().map(|&s| self.segments[s]).collect(),
-            references: order.iter().map(|&s| self.references[s]).collect(),
-            segment_of: self.segment_of.iter().map(|&s| new(s)).collect(),
-            ..self
-        }
-    }
 }
 
 /// The angle at which a segment's camera sees a picture's corners best, found from all sides; with the median distance

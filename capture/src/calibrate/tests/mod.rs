@@ -1,5 +1,6 @@
 //! Cameras told from corners whose truth is known.
 
+mod chance;
 mod faults;
 mod lens;
 mod platter;
@@ -175,4 +176,10 @@ fn angle_error_deg(result: &Calibration, truth: &[f64]) -> f64 {
 
 fn axis_error_deg(result: &Calibration, film: &Film) -> f64 {
     platter(result).axis_direction.angle(&film.axis.1).to_degrees()
+}
+
+/// Turns a little unevenly: 3 % once a turn and 1 % seven times a turn.
+fn uneven(frames: usize, turns: f64) -> Vec<f64> {
+    let steady = |k: usize| TAU * turns * k as f64 / frames as f64;
+    (0..frames).map(|k| steady(k) + 0.03 * steady(k).sin() + 0.01 / 7.0 * (7.0 * steady(k)).sin()).collect()
 }

@@ -79,12 +79,6 @@ fn a_camera_that_stands_still_has_one_segment() {
     }
 }
 
-/// Turns a little unevenly: 3 % once a turn and 1 % seven times a turn.
-fn uneven(frames: usize, turns: f64) -> Vec<f64> {
-    let steady = |k: usize| TAU * turns * k as f64 / frames as f64;
-    (0..frames).map(|k| steady(k) + 0.03 * steady(k).sin() + 0.01 / 7.0 * (7.0 * steady(k)).sin()).collect()
-}
-
 #[test]
 fn pictures_without_the_board_get_their_camera_from_the_motion() {
     let film = Film { angles: uneven(120, 1.05), ..Film::flat(25.0, 120) };
