@@ -11,7 +11,7 @@ pub(super) struct Cleaned {
     pub(super) pictures: Vec<Picture>,
     /// The target's index for each of the rig's points.
     pub(super) indices: Vec<usize>,
-    pub(super) findings: Vec<String>,
+    pub(super) notes: Vec<String>,
 }
 
 /// Refuses targets and options that cannot be.
@@ -71,13 +71,13 @@ fn is_line(points: &[Point3<f64>]) -> bool {
 
 /// Keeps corners of the target that are finite and seen once; of markers, those whose four corners are.
 pub(super) fn clean(target: &Target, sightings: &[Sighting]) -> Cleaned {
-    let mut findings = Vec::new();
+    let mut notes = Vec::new();
     let mut seen: Vec<BTreeMap<usize, Point2<f64>>> = Vec::new();
     for sighting in sightings {
         let (corners, twice) = once(target, sighting);
         if !twice.is_empty() {
             let what = if matches!(target, Target::Markers { .. }) { "markers" } else { "corners" };
-            findings.push(format!(
+            notes.push(format!(
                 "Picture {} shows {what} {} twice; they are left out there.",
                 sighting.frame,
                 list(&twice)
@@ -102,7 +102,7 @@ pub(super) fn clean(target: &Target, sightings: &[Sighting]) -> Cleaned {
         Picture { is_used: !corners.is_empty(), corners, film: sighting.film, time_s: sighting.time_s }
     };
     let pictures = sightings.iter().zip(&seen).map(picture).collect();
-    Cleaned { pictures, indices, findings }
+    Cleaned { pictures, indices, notes }
 }
 
 /// The corners of a sighting by index, and those (or the markers) that came twice.

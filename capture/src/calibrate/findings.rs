@@ -48,19 +48,28 @@ pub(super) fn lens_report(estimate: &Estimate) -> LensReport {
 }
 
 /// What a user should know, the gravest first.
-pub(super) fn findings(estimate: &Estimate, result: &Calibration, sightings: &[Sighting]) -> Vec<String> {
+pub(super) fn findings(estimate: &Estimate, result: &Calibration) -> Vec<String> {
     let mut found = Vec::new();
     found.extend(misfit(result.rms_px));
     found.extend(lens_findings(result));
     found.extend(motion_findings(estimate, result));
     found.extend(picture_findings(result));
-    found.extend(cover(result, sightings));
-    found.extend(relief(estimate));
     if !estimate.unreached.is_empty() {
         let markers = list(&estimate.unreached);
         found.push(format!("Markers {markers} are never seen together with the others; they are left out."));
     }
     found
+}
+
+/// What is good to know, and nothing to mend.
+pub(super) fn notes(estimate: &Estimate, result: &Calibration, sightings: &[Sighting]) -> Vec<String> {
+    let is_carried = matches!(result.motion, Motion::FreeHand);
+    let carried = is_carried.then(|| "The camera was carried: every picture has a pose of its own.".to_owned());
+    let mut notes = Vec::from_iter(carried);
+    notes.extend(left_out(result));
+    notes.extend(cover(result, sightings));
+    notes.extend(relief(estimate));
+    notes
 }
 
 fn misfit(rms: f64) -> Option<String> {
@@ -97,7 +106,7 @@ fn lens_findings(result: &Calibration) -> Vec<String> {
 
 fn motion_findings(estimate: &Estimate, result: &Calibration) -> Vec<String> {
     let Motion::Turntable(turntable) = &result.motion else {
-        return vec!["The camera was carried: every picture has a pose of its own.".to_owned()];
+        return Vec::new();
     };
     let mut found = Vec::new();
     let (rms, free) = (result.rms_px, estimate.free_rms_px);
@@ -120,6 +129,23 @@ fn motion_findings(estimate: &Estimate, result: &Calibration) -> Vec<String> {
 fn picture_findings(result: &Calibration) -> Vec<String> {
     let mut found = Vec::new();
     let is_rejected = |standing: &Standing| matches!(standing, Standing::Rejected(_));
+    let rejected = result.frames.iter().filter(|f| is_rejected(&f.standing)).count();
+    if 2 * rejected > result.frames.len() {
+        found.insert(0, format!("{rejected} of {} pictures could not be used.", result.frames.len()));
+    }
+    let rms: Vec<f64> = result.frames.iter().filter(|f| !is_rejected(&f.standing)).map(|f| f.rms_px).collect();
+    let most = 2.0 * median(&rms);
+    let worse: Vec<usize> =
+        result.frames.iter().filter(|f| f.rms_px > most && f.rms_px > 0.3).map(|f| f.frame).collect();
+    if !worse.is_empty() {
+        found.push(format!("Pictures {} fit more than twice as badly as most.", list(&worse)));
+    }
+    found
+}
+
+/// Pictures and corners that took no part.
+fn left_out(result: &Calibration) -> Vec<String> {
+    let mut found = Vec::new();
     for frame in &result.frames {
         if let Standing::Rejected(why) = &frame.standing {
             let then = match frame.filled_deviation {
@@ -137,17 +163,6 @@ fn picture_findings(result: &Calibration) -> Vec<String> {
              them, or they are misread.",
             list(&doubtful)
         ));
-    }
-    let rejected = result.frames.iter().filter(|f| is_rejected(&f.standing)).count();
-    if 2 * rejected > result.frames.len() {
-        found.insert(0, format!("{rejected} of {} pictures could not be used.", result.frames.len()));
-    }
-    let rms: Vec<f64> = result.frames.iter().filter(|f| !is_rejected(&f.standing)).map(|f| f.rms_px).collect();
-    let most = 2.0 * median(&rms);
-    let worse: Vec<usize> =
-        result.frames.iter().filter(|f| f.rms_px > most && f.rms_px > 0.3).map(|f| f.frame).collect();
-    if !worse.is_empty() {
-        found.push(format!("Pictures {} fit more than twice as badly as most.", list(&worse)));
     }
     found
 }

@@ -122,8 +122,10 @@ pub struct Calibration {
     /// where the axis meets the target's plane; its x is the target's, made orthogonal. Without an axis: the target's
     /// axes about its middle.
     pub world_from_target: Isometry3<f64>,
-    /// What a user should know, in sentences, the gravest first.
+    /// What will show in the model, in sentences, the gravest first.
     pub findings: Vec<String>,
+    /// What is good to know, and nothing to mend.
+    pub notes: Vec<String>,
 }
 
 /// One number of the lens.

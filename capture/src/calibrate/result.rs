@@ -3,7 +3,7 @@
 use super::clean::Cleaned;
 use super::estimate::Estimate;
 use super::fill::Track;
-use super::findings::{findings, lens_report};
+use super::findings::{findings, lens_report, notes};
 use super::homography::median;
 use super::rig::{Picture, Poses, Rig, Turning, turned};
 use super::turntable::unwrap;
@@ -51,10 +51,12 @@ pub(super) fn result(estimate: &Estimate, cleaned: &Cleaned, sightings: &[Sighti
         rms_px: estimate.fit.rms_px(),
         points,
         world_from_target,
-        findings: cleaned.findings.clone(),
+        findings: Vec::new(),
+        notes: cleaned.notes.clone(),
     };
     calibration.fill(sightings);
-    calibration.findings.extend(findings(estimate, &calibration, sightings));
+    calibration.findings = findings(estimate, &calibration);
+    calibration.notes.extend(notes(estimate, &calibration, sightings));
     calibration
 }
 

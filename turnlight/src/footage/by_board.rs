@@ -35,6 +35,7 @@ pub(super) fn find_cameras(
     };
     let found = stages.run("calibrate", |_| calibrate(&target(&pattern, options), &sightings, &calibrate_options));
     let calibration = found.map_err(|fault| Error::Failed(format!("{}: {fault}", footage.path().display())))?;
+    let notes = calibration.notes.clone();
     let mut findings = calibration.findings.clone();
     findings.extend(seen.fault.as_ref().map(|fault| format!("the footage is used as far as it goes: {fault}")));
     let shots = shots(&seen, &calibration);
@@ -51,6 +52,7 @@ pub(super) fn find_cameras(
         unit: is_measured.then_some(1.0),
         has_plane: true,
         findings,
+        notes,
     })
 }
 

@@ -116,7 +116,8 @@ fn photographed(
         });
     }
     let has_plane = false;
-    Ok(Shots { shots, size, calibration: None, board: None, told_by, unit: None, has_plane, findings: Vec::new() })
+    let (findings, notes) = (Vec::new(), Vec::new());
+    Ok(Shots { shots, size, calibration: None, board: None, told_by, unit: None, has_plane, findings, notes })
 }
 
 /// The frames of footage that is photographs alone.

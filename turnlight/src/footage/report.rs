@@ -166,12 +166,14 @@ impl CapturedFootage {
         let mean = agreement.iter().sum::<f64>() / agreement.len().max(1) as f64;
         if mean < FAIR_AGREEMENT {
             let text = format!(
-                "silhouettes agree with one another to {:.0} % only: look at the outlines below, and hang a backdrop of \
+                "Silhouettes agree with one another to {:.0} % only: look at the outlines below, and hang a backdrop of \
                  another colour, or give masks (--masks)",
                 100.0 * mean
             );
             findings.push(Finding { severity: Severity::Warning, text });
         }
+        let note = |text: &String| Finding { severity: Severity::Note, text: text.clone() };
+        findings.extend(self.shots.notes.iter().map(note));
         if self.shots.unit.is_none() && self.shots.calibration.is_some() {
             let text =
                 "the capture has no scale: say how large the squares of the board are (--square 30mm)".to_owned();

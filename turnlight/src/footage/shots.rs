@@ -47,8 +47,10 @@ pub struct Shots {
     pub unit: Option<f64>,
     /// Whether the object stands on something flat in the world's plane z = 0, and reaches up from it.
     pub has_plane: bool,
-    /// What the user should know.
+    /// What will show in the model.
     pub findings: Vec<String>,
+    /// What is good to know.
+    pub notes: Vec<String>,
 }
 
 impl Shots {

@@ -26,7 +26,7 @@ fn a_picture_with_wrong_ids_is_rejected_and_named() {
     let result = of_board(&sightings, &known());
     assert!(axis_error_deg(&result, &film) < 0.02);
     assert!(matches!(&result.frames[8].standing, Standing::Rejected(_)), "{:?}", result.frames[8]);
-    assert!(result.findings.iter().any(|f| f.starts_with("Picture 8 ")), "{:?}", result.findings);
+    assert!(result.notes.iter().any(|f| f.starts_with("Picture 8 ")), "{:?}", result.notes);
     // It turns with the others all the same.
     let error = platter(&result).angles[8].unwrap() - film.angles[8];
     assert!(error.abs() < 0.005, "{error}");
@@ -59,7 +59,7 @@ fn corners_that_are_none_are_passed_over() {
     let result = of_board(&sightings, &known());
     assert!(axis_error_deg(&result, &film) < 0.05);
     assert_eq!(result.frames[5].used.iter().filter(|&&index| index == twice.0).count(), 0);
-    assert!(result.findings.iter().any(|f| f.contains("twice")), "{:?}", result.findings);
+    assert!(result.notes.iter().any(|f| f.contains("twice")), "{:?}", result.notes);
 }
 
 #[test]

@@ -109,7 +109,7 @@ fn angles_that_nothing_tells_are_not_made_up() {
     let result = of_board(&sightings, &known());
     assert_eq!(result.frames[12].camera, None);
     assert_eq!(platter(&result).angles[12], None);
-    assert!(result.findings.iter().any(|f| f.contains("no camera")));
+    assert!(result.notes.iter().any(|f| f.contains("no camera")));
 }
 
 #[test]

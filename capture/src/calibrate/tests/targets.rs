@@ -170,7 +170,7 @@ fn markers_on_paper_that_curls_leave_its_plane() {
     let sightings = marker_sightings(&film, &layout, 77);
     let result = calibrate(&Target::Markers { side: 0.025 }, &sightings, &known()).unwrap();
     assert!(result.rms_px < 0.3, "{} {:?}", result.rms_px, result.findings);
-    assert!(result.findings.iter().any(|f| f.contains("out of their plane")), "{:?}", result.findings);
+    assert!(result.notes.iter().any(|f| f.contains("out of their plane")), "{:?}", result.notes);
     // The axis of the film in the world is the world's.
     assert!(angle_error_deg(&result, &film.angles) < 0.02);
     let flat = marker_sightings(&film, &strewn(&(0..16).collect::<Vec<_>>()), 77);
