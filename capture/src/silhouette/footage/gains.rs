@@ -115,7 +115,7 @@ fn alike(observed: &[Vec<Option<[f32; 3]>>]) -> Vec<[f64; 3]> {
     gains
 }
 
-/// The half of the places that look most alike in all rows.
+/// The quarter of the places that look most alike in all rows: more of a frame may be platter.
 fn steady(rows: &[Vec<Option<[f32; 3]>>], usual: Vec<Option<[f32; 3]>>) -> Vec<Option<[f32; 3]>> {
     let deviation = |place: usize| {
         let middle = usual[place]?[1];
@@ -127,7 +127,7 @@ fn steady(rows: &[Vec<Option<[f32; 3]>>], usual: Vec<Option<[f32; 3]>>) -> Vec<O
     let deviations: Vec<Option<f32>> = (0..usual.len()).map(deviation).collect();
     let mut sorted: Vec<f32> = deviations.iter().copied().flatten().collect();
     sorted.sort_by(f32::total_cmp);
-    let Some(&limit) = sorted.get(sorted.len() / 2) else { return usual };
+    let Some(&limit) = sorted.get(sorted.len() / 4) else { return usual };
     let keep = |(colour, deviation): (Option<[f32; 3]>, &Option<f32>)| {
         colour.filter(|_| deviation.is_some_and(|d| d <= limit))
     };
