@@ -103,11 +103,11 @@ fn alike(observed: &[Vec<Option<[f32; 3]>>]) -> Vec<[f64; 3]> {
         let usual = steady(&evened, usual(&evened, LEAST_FRAMES.min(observed.len())));
         for (row, gain) in evened.iter().zip(&mut gains) {
             for c in 0..3 {
-                let ratios = row.iter().zip(&usual).filter_map(|(o, u)| Some(u.as_ref()?[c] / o.as_ref()?[c]));
+                let pairs = row.iter().zip(&usual).filter_map(|(o, u)| Some((u.as_ref()?[c], o.as_ref()?[c])));
                 // A ratio that far off is another thing.
-                let mut ratios: Vec<f32> = ratios.filter(|r| (0.4..2.5).contains(r)).collect();
-                if ratios.len() >= 32 {
-                    gain[c] *= centre(&mut ratios);
+                let pairs: Vec<(f32, f32)> = pairs.filter(|(u, o)| (0.4..2.5).contains(&(u / o))).collect();
+                if pairs.len() >= 32 {
+                    gain[c] *= centre(&pairs);
                 }
             }
         }
@@ -115,7 +115,7 @@ fn alike(observed: &[Vec<Option<[f32; 3]>>]) -> Vec<[f64; 3]> {
     gains
 }
 
-/// The half of the places that look most alike in all rows.
+/// The quarter of the places that look most alike in all rows: more of a frame may be platter.
 fn steady(rows: &[Vec<Option<[f32; 3]>>], usual: Vec<Option<[f32; 3]>>) -> Vec<Option<[f32; 3]>> {
     let deviation = |place: usize| {
         let middle = usual[place]?[1];
@@ -127,22 +127,25 @@ fn steady(rows: &[Vec<Option<[f32; 3]>>], usual: Vec<Option<[f32; 3]>>) -> Vec<O
     let deviations: Vec<Option<f32>> = (0..usual.len()).map(deviation).collect();
     let mut sorted: Vec<f32> = deviations.iter().copied().flatten().collect();
     sorted.sort_by(f32::total_cmp);
-    let Some(&limit) = sorted.get(sorted.len() / 2) else { return usual };
+    let Some(&limit) = sorted.get(sorted.len() / 4) else { return usual };
     let keep = |(colour, deviation): (Option<[f32; 3]>, &Option<f32>)| {
         colour.filter(|_| deviation.is_some_and(|d| d <= limit))
     };
     usual.into_iter().zip(&deviations).map(keep).collect()
 }
 
-/// Mean of the values near the median: what has changed its light for another reason than the exposure falls away.
-fn centre(values: &mut [f32]) -> f64 {
-    let middle = values.len() / 2;
-    let median = *values.select_nth_unstable_by(middle, f32::total_cmp).1;
-    let mut gaps: Vec<f32> = values.iter().map(|v| (v - median).abs()).collect();
+/// Ratio of the sums of pairs whose ratio is near the median one: what has changed its light for another reason than
+/// the exposure falls away, and the bright, which say more, count more.
+fn centre(pairs: &[(f32, f32)]) -> f64 {
+    let mut ratios: Vec<f32> = pairs.iter().map(|(u, o)| u / o).collect();
+    let middle = ratios.len() / 2;
+    let median = *ratios.select_nth_unstable_by(middle, f32::total_cmp).1;
+    let mut gaps: Vec<f32> = ratios.iter().map(|r| (r - median).abs()).collect();
     // Two standard deviations, were they normal.
     let reach = 3.0 * *gaps.select_nth_unstable_by(middle, f32::total_cmp).1;
-    let near: Vec<f64> = values.iter().filter(|v| (**v - median).abs() <= reach).map(|&v| f64::from(v)).collect();
-    near.iter().sum::<f64>() / near.len() as f64
+    let near = pairs.iter().filter(|(u, o)| (u / o - median).abs() <= reach);
+    let (usual, seen) = near.fold((0.0, 0.0), |sum, &(u, o)| (sum.0 + f64::from(u), sum.1 + f64::from(o)));
+    usual / seen
 }
 
 /// Per place and channel the median over the rows that see it.

@@ -8,7 +8,7 @@
 //!    uncovered, which colours the object has, and which frame contradicts the others.
 //! 5. *Rim*: coverage at the edge from the colours on both sides of it.
 //!
-//! Steps 2 to 4 run twice on thumbnails, then twice at full size.
+//! Steps 2 to 4 run three times on thumbnails, then twice at full size.
 
 mod cloth;
 mod cluster;
