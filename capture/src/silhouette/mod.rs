@@ -5,6 +5,6 @@ mod footage;
 mod photographs;
 
 pub use footage::{
-    Evidence, FetchFrame, SilhouetteOptions, Silhouettes, StageSetup, check_silhouettes, find_silhouettes,
+    Evidence, FetchFrame, Print, SilhouetteOptions, Silhouettes, StageSetup, check_silhouettes, find_silhouettes,
 };
 pub use photographs::{find_mattes, find_mattes_in_box};

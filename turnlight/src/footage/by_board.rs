@@ -9,8 +9,10 @@ use capture::calibrate::{
 };
 use capture::choose::PoseSource;
 use capture::footage::Footage;
+use capture::silhouette::Print;
 use capture::video::{Observations, Observed, Pattern, observe, recognise_in_footage};
 use capture::{Board, Intrinsics};
+use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, UnitQuaternion, Vector3};
 
 /// Corners that tell a camera: a homography needs four, and two more show that it is right.
 const FEWEST_CORNERS: usize = 6;
@@ -43,9 +45,10 @@ pub(super) fn find_cameras(
     Ok(Shots {
         shots,
         size: seen.size,
-        board: match pattern {
-            Pattern::Board(board) => Some(board),
-            Pattern::Markers(_) => None,
+        print: match pattern {
+            Pattern::Board(board @ Board::Charuco { .. }) => print(board, &calibration),
+            // Of a grid of markers there may be the rim alone, and of a chessboard nothing below the object.
+            Pattern::Board(_) | Pattern::Markers(_) => None,
         },
         calibration: Some(calibration),
         told_by,
@@ -180,6 +183,28 @@ fn target(pattern: &Pattern, options: &FootageOptions) -> Target {
         Pattern::Board(board) => Target::Points(board.corners()),
         Pattern::Markers(_) => Target::Markers { side: options.length.unwrap_or(1.0) },
     }
+}
+
+/// Where the board lies in the world: the rigid motion that takes the corners of the board to where they were found, by
+/// least squares (Arun, Huang and Blostein: Least-Squares Fitting of Two 3-D Point Sets, PAMI 9(5), 1987).
+fn print(board: Board, calibration: &Calibration) -> Option<Print> {
+    let corners = board.corners();
+    let pair =
+        |(index, place): &(usize, Point3<f64>)| Some((*corners.get(*index)?, calibration.world_from_target * place));
+    let pairs: Vec<(Point3<f64>, Point3<f64>)> = calibration.points.iter().filter_map(pair).collect();
+    let mean = |of: fn(&(Point3<f64>, Point3<f64>)) -> Point3<f64>| {
+        pairs.iter().map(|pair| of(pair).coords).sum::<Vector3<f64>>() / pairs.len().max(1) as f64
+    };
+    let (on_board, in_world) = (mean(|pair| pair.0), mean(|pair| pair.1));
+    let scatter: Matrix3<f64> =
+        pairs.iter().map(|(b, w)| (b.coords - on_board) * (w.coords - in_world).transpose()).sum();
+    let svd = scatter.svd(true, true);
+    let (u, v) = (svd.u?, svd.v_t?.transpose());
+    // Points of a plane leave a reflection open.
+    let turned = v * Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, (v * u.transpose()).determinant())) * u.transpose();
+    let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(turned));
+    let world_from_board = Isometry3::from_parts((in_world - rotation * on_board).into(), rotation);
+    (pairs.len() >= 3).then(|| Print { board, board_from_world: world_from_board.inverse() })
 }
 
 /// A chessboard whose counts are both even or both odd shows the same squares when turned half around.

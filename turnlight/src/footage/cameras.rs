@@ -117,7 +117,7 @@ fn photographed(
     }
     let has_plane = false;
     let (findings, notes) = (Vec::new(), Vec::new());
-    Ok(Shots { shots, size, calibration: None, board: None, told_by, unit: None, has_plane, findings, notes })
+    Ok(Shots { shots, size, calibration: None, print: None, told_by, unit: None, has_plane, findings, notes })
 }
 
 /// The frames of footage that is photographs alone.

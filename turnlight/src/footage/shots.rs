@@ -1,9 +1,10 @@
 //! Every frame of the footage, with what is known of it.
 
+use capture::Camera;
 use capture::calibrate::{Calibration, Motion, Segment, Turntable};
 use capture::choose::PoseSource;
 use capture::footage::FrameSource;
-use capture::{Board, Camera};
+use capture::silhouette::Print;
 
 /// One frame of the footage.
 #[derive(Clone, Debug)]
@@ -39,8 +40,8 @@ pub struct Shots {
     pub size: [usize; 2],
     /// What the board told, if there was one.
     pub calibration: Option<Calibration>,
-    /// The board, as it was recognised or given.
-    pub board: Option<Board>,
+    /// The board, as it was recognised or given, and where it lies.
+    pub print: Option<Print>,
     /// What told the cameras, in words.
     pub told_by: String,
     /// Metres per world unit, where known.

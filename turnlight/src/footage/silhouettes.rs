@@ -32,6 +32,7 @@ fn setup(shots: &Shots, kept: &[usize], options: &FootageOptions) -> Result<Stag
         cameras: kept.iter().filter_map(|&at| shots.shots[at].camera).collect(),
         segments: kept.iter().map(|&at| shots.shots[at].standpoint).collect(),
         has_plane: shots.has_plane,
+        print: shots.print,
         clean_plates: clean_plates.collect::<Result<_, Error>>()?,
         aabb: None,
     })

@@ -5,7 +5,7 @@ use crate::Image;
 use crate::matte::{components, signed_distance};
 
 /// Log odds gained well inside the hull.
-const TRUST: f32 = 3.0;
+const TRUST: f32 = 9.0;
 
 /// Log odds gained per pixel inside the hull.
 const SLOPE: f32 = 0.5;

@@ -15,7 +15,7 @@ const LEAST_GAP: f64 = 0.08;
 const LARGEST_UNSEPARATED: f64 = 0.4;
 
 /// Cells kept around the hull.
-const MARGIN_CELLS: f64 = 3.0;
+const MARGIN_CELLS: f64 = 8.0;
 
 /// Judges silhouettes from elsewhere.
 ///

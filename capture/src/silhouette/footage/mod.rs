@@ -29,7 +29,7 @@ mod stage;
 mod tests;
 
 pub use judgement::check_silhouettes;
-pub use stage::{FetchFrame, StageSetup};
+pub use stage::{FetchFrame, Print, StageSetup};
 
 use super::photographs::find_mattes_in_box;
 use crate::{Aabb, CaptureError, Image};

@@ -78,7 +78,7 @@ pub(super) fn of(
             background.set(x, y, Some(behind.colour));
         }
     }
-    Odds { log_odds: blur(&log_odds, 0.7), background }
+    Odds { log_odds: blur(&log_odds, 1.1), background }
 }
 
 /// Natural logarithm of the density of `colour` where `behind` is seen.

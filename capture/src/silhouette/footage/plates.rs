@@ -6,6 +6,7 @@ use super::light::Toned;
 use super::optics::{Cutout, Directions, on_plane};
 use super::palette::Palettes;
 use super::shade::Shade;
+use super::stage::Print;
 use crate::{Aabb, Camera, Image};
 use nalgebra::Point3;
 use rayon::prelude::*;
@@ -18,6 +19,9 @@ const LARGEST_SPREAD: f32 = 40.0;
 
 /// Views of a place on the target that must agree.
 const LEAST_SUPPORT: u8 = 3;
+
+/// Views of a place that leave no doubt.
+const SURE: u8 = 6;
 
 /// Log odds by colour from which on a place beside the hull is the object, not the target.
 const SUSPICIOUS: f32 = 2.0;
@@ -95,7 +99,7 @@ pub(super) struct TargetPlate {
 
 impl TargetPlate {
     /// Of the part of the plane that is seen behind and below `bounds`. `None` where no frame sees any.
-    pub(super) fn of(frames: &[PlateFrame], bounds: &Aabb, palettes: &Palettes) -> Option<Self> {
+    pub(super) fn of(frames: &[PlateFrame], bounds: &Aabb, palettes: &Palettes, print: Option<&Print>) -> Option<Self> {
         let footprints: Vec<[f64; 2]> = frames.iter().flat_map(|f| shadow_of(bounds, &f.camera)).collect();
         let area = Aabb::around(footprints.iter().map(|p| Point3::new(p[0], p[1], 0.0)))?;
         // Rays near the horizon reach far: no further than three times the object's box.
@@ -121,7 +125,44 @@ impl TargetPlate {
             let shades: Vec<Shade> = frames.par_iter().map(|f| plate.shade(f)).collect();
             plate.texture = plate.looked_up(frames, Some(&shades), palettes);
         }
+        if let Some(print) = print {
+            plate.complete(print);
+        }
         Some(plate)
+    }
+
+    /// Puts what is printed where too few frames agree on what they see: places that the object nearly always covers are
+    /// known all the same. Ink and paper look as they do where they are seen.
+    fn complete(&mut self, print: &Print) {
+        let width = self.texture.width();
+        let place = |at: usize| [at % width, at / width].map(|v| v as f64 + 0.5);
+        let dark: Vec<Option<f32>> = (0..self.texture.pixels().len())
+            .into_par_iter()
+            .map(|at| {
+                let [u, v] = place(at);
+                print.dark_share([self.origin[0] + u * self.texel, self.origin[1] + v * self.texel], self.texel)
+            })
+            .collect();
+        let seen = |share: f32| -> Option<Cluster> {
+            let alike =
+                self.texture.pixels().iter().zip(&dark).filter(|(t, d)| **d == Some(share) && t.support >= SURE);
+            let mut levels: [Vec<f32>; 4] = Default::default();
+            for (texel, _) in alike {
+                (0..3).for_each(|c| levels[c].push(texel.colour[c]));
+                levels[3].push(texel.spread);
+            }
+            let [r, g, b, spread] = levels.map(median);
+            Some(Cluster { colour: [r?, g?, b?], spread: spread?, support: SURE })
+        };
+        let (Some(paper), Some(ink)) = (seen(0.0), seen(1.0)) else { return };
+        for (texel, dark) in self.texture.pixels_mut().iter_mut().zip(&dark) {
+            let Some(dark) = *dark else { continue };
+            let colour = [0, 1, 2].map(|c| paper.colour[c] + (ink.colour[c] - paper.colour[c]) * dark);
+            let is_seen = texel.support >= SURE && !texel.is_covered();
+            if !is_seen {
+                *texel = Cluster { colour, spread: paper.spread.max(ink.spread), support: SURE };
+            }
+        }
     }
 
     /// Colour and spread at a place on the plane, or [`Cluster::COVERED`]; `None` where too little is known.
@@ -207,6 +248,11 @@ impl TargetPlate {
         let pixels = (0..width * height).into_par_iter().map_init(Vec::new, texel).collect();
         Image::from_pixels(width, height, pixels).unwrap_or_default()
     }
+}
+
+fn median(mut values: Vec<f32>) -> Option<f32> {
+    let middle = values.len() / 2;
+    (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f32::total_cmp).1)
 }
 
 /// Where the rays through the corners of a box meet the plane.

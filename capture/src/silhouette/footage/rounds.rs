@@ -153,8 +153,11 @@ impl Scene<'_> {
         let frames: Vec<_> =
             chosen.par_iter().map(|&i| self.plate_frame(i, hull.as_ref(), cutouts[i], round)).collect();
         let frames: Vec<PlateFrame> = frames.into_iter().collect::<Result<_, _>>()?;
-        let target =
-            if self.setup.has_plane { TargetPlate::of(&frames, &belief.bounds, &belief.palettes) } else { None };
+        let target = if self.setup.has_plane {
+            TargetPlate::of(&frames, &belief.bounds, &belief.palettes, self.setup.print.as_ref())
+        } else {
+            None
+        };
         let room = |segment: usize| {
             let members: Vec<&PlateFrame> = frames.iter().filter(|f| f.segment == Some(segment)).collect();
             let seen = (0..count).filter(|&i| self.setup.segments[i] == Some(segment)).map(|i| cutouts[i]);
@@ -210,12 +213,7 @@ impl Scene<'_> {
             return Part { cutout, camera, matte, unseparated: 0.0, colours };
         };
         let mask = decision::decided(&odds, &hull, round.distrust);
-        let matte = if round.is_refined {
-            let once = rim::refined(&picture, &odds.background, &mask);
-            rim::refined(&picture, &odds.background, &once)
-        } else {
-            mask
-        };
+        let matte = if round.is_refined { rim::refined(&picture, &odds.background, &mask) } else { mask };
         let colours = colours(&picture, &odds.log_odds, &matte);
         Part { cutout, camera, matte, unseparated: unseparated(&odds.log_odds, &hull), colours }
     }

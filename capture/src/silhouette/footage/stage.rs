@@ -1,8 +1,8 @@
 //! What is known of how footage was taken.
 
 use crate::votes::nearest_to_rays;
-use crate::{Aabb, Camera, CaptureError, Image, Ray};
-use nalgebra::{Point3, Vector3};
+use crate::{Aabb, Board, Camera, CaptureError, Image, Ray};
+use nalgebra::{Isometry3, Point3, Vector3};
 
 /// Hands out a frame by its position; asked several times for each, from several threads.
 pub type FetchFrame<'a> = dyn Fn(usize) -> Result<Image<[u8; 3]>, CaptureError> + Sync + 'a;
@@ -10,8 +10,38 @@ pub type FetchFrame<'a> = dyn Fn(usize) -> Result<Image<[u8; 3]>, CaptureError> 
 /// Frames in a segment that make the room known.
 const LEAST_OF_SEGMENT: usize = 4;
 
+/// Probes of the print along a side of a texel.
+const PROBES: usize = 4;
+
 /// The longer side of a thumbnail is at least this, in pixels.
 const THUMBNAIL: usize = 320;
+
+/// The print on the target.
+#[derive(Clone, Copy, Debug)]
+pub struct Print {
+    /// What is printed.
+    pub board: Board,
+    /// World to board coordinates; the board lies in the world's plane z = 0.
+    pub board_from_world: Isometry3<f64>,
+}
+
+impl Print {
+    /// Share of a square of side `side` (metres) about a place of the plane that is dark; `None` beside the pattern,
+    /// where there may be anything.
+    pub(super) fn dark_share(&self, place: [f64; 2], side: f64) -> Option<f32> {
+        let at = |[x, y]: [f64; 2]| (self.board_from_world * Point3::new(x, y, 0.0)).xy();
+        let [width, height] = self.board.size();
+        let middle = at(place);
+        let is_inside = middle.x > side && middle.y > side && middle.x < width - side && middle.y < height - side;
+        if !is_inside {
+            return None;
+        }
+        let offset = |k: usize| ((k as f64 + 0.5) / PROBES as f64 - 0.5) * side;
+        let probes = (0..PROBES * PROBES).map(|k| [place[0] + offset(k % PROBES), place[1] + offset(k / PROBES)]);
+        let dark = probes.filter(|&probe| self.board.is_dark(at(probe))).count();
+        Some(dark as f32 / (PROBES * PROBES) as f32)
+    }
+}
 
 /// What is known of how the footage was taken.
 #[derive(Clone, Debug, Default)]
@@ -23,6 +53,8 @@ pub struct StageSetup {
     pub segments: Vec<Option<usize>>,
     /// Whether the object stands on a flat, printed or plain target in z = 0, and is all in z > 0.
     pub has_plane: bool,
+    /// What is printed on the target, where that is known.
+    pub print: Option<Print>,
     /// Per segment a picture of the stage without object and platter; may be shorter than there are segments.
     pub clean_plates: Vec<Option<Image<[u8; 3]>>>,
     /// A box around the object, where known.
