@@ -124,12 +124,15 @@ impl Cartoon {
             let offset = Vector2::new((ray % RAYS) as f64 + 0.5, (ray / RAYS) as f64 + 0.5) / RAYS as f64;
             let pixel = Point2::new(x as f64, y as f64) + offset;
             let (colour, is_ball) = self.seen(camera, board_from_world, lamp, pixel);
-            (0..3).for_each(|c| sum[c] += colour[c]);
+            (0..3).for_each(|c| sum[c] += linear(colour[c]));
             covered += usize::from(is_ball);
         }
         let count = (RAYS * RAYS) as f64;
         let grain = grain(x, y, camera);
-        (sum.map(|s| (s / count + grain).round().clamp(0.0, 255.0) as u8), (255 * covered / (RAYS * RAYS)) as u8)
+        (
+            sum.map(|s| (encoded(s / count) + grain).round().clamp(0.0, 255.0) as u8),
+            (255 * covered / (RAYS * RAYS)) as u8,
+        )
     }
 
     fn seen(
@@ -170,6 +173,15 @@ impl Cartoon {
         let light = 1.1 - 0.3 * pixel.y / self.size[1] as f64;
         (self.cloth.map(|c| f64::from(c) * light), false)
     }
+}
+
+/// Levels of 8 bits to light and back; pixels average light. A power of 2.2 is near enough.
+fn linear(level: f64) -> f64 {
+    (level / 255.0).max(0.0).powf(2.2)
+}
+
+fn encoded(light: f64) -> f64 {
+    255.0 * light.powf(1.0 / 2.2)
 }
 
 /// Uniform noise of ± 2 levels, another in every frame.

@@ -1,5 +1,6 @@
 //! Which silhouettes agree, and what to say of them.
 
+use super::cloth::Cloth;
 use super::consensus::{Consensus, Dissent};
 use super::palette::Palettes;
 use super::rounds::{Belief, Found, Part};
@@ -13,6 +14,12 @@ const LEAST_GAP: f64 = 0.08;
 
 /// A share of the object explained as background from which on nothing separates.
 const LARGEST_UNSEPARATED: f64 = 0.4;
+
+/// A share of the object's colours that are the cloth's from which on it cannot be told from it.
+const LARGEST_CAMOUFLAGE: f64 = 0.25;
+
+/// Of the cloth's (encoded) light, what the object may have where it is of the same colour.
+const SHADES: std::ops::RangeInclusive<f32> = 0.35..=1.3;
 
 /// Cells kept around the hull.
 const MARGIN_CELLS: f64 = 8.0;
@@ -129,6 +136,30 @@ pub(super) fn summed_up(found: Found, gains: Vec<[f64; 3]>, setup: &StageSetup, 
         evidence,
         findings,
     }
+}
+
+/// Says so where much of what is seen of the object looks like the cloth: parts of it that only ever stand before the
+/// cloth are then missing in all frames alike, and no hull can tell.
+pub(super) fn camouflage<'a>(found: &Found, cloths: impl Iterator<Item = &'a Cloth>) -> Option<String> {
+    let seen: Vec<[f32; 3]> = found.parts.iter().flat_map(|part| part.colours[0].iter().copied()).collect();
+    let like = |cloth: &Cloth| {
+        let middle = cloth.at(0.5, 0.5);
+        let is_like = |colour: &&[f32; 3]| {
+            // In light or in shade.
+            let dot = |a: &[f32; 3]| (0..3).map(|c| a[c] * middle[c]).sum::<f32>();
+            let shade = dot(colour) / dot(&middle).max(1.0);
+            SHADES.contains(&shade) && cloth.is_like(&middle, &colour.map(|v| v / shade))
+        };
+        seen.iter().filter(is_like).count() as f64 / seen.len().max(1) as f64
+    };
+    let share = cloths.map(like).fold(0.0, f64::max);
+    (share > LARGEST_CAMOUFLAGE).then(|| {
+        format!(
+            "{:.0} % of what is seen of the object has the colour of the backdrop: parts of it may be missing; hang a \
+             cloth of another colour, or give masks",
+            100.0 * share
+        )
+    })
 }
 
 fn findings(found: &Found) -> Vec<String> {

@@ -115,7 +115,10 @@ pub fn find_silhouettes(
         Some(better) => fine.round(better, &rounds::LAST)?,
         None => first,
     };
-    Ok(judgement::summed_up(found, gains, setup, Evidence::Plates))
+    let camouflage = judgement::camouflage(&found, cloths.iter().flatten());
+    let mut silhouettes = judgement::summed_up(found, gains, setup, Evidence::Plates);
+    silhouettes.findings.extend(camouflage);
+    Ok(silhouettes)
 }
 
 /// `f` of all frames, each in memory only while it is worked on.

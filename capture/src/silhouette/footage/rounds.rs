@@ -110,7 +110,7 @@ pub(super) struct Part {
     /// Share of the object, well inside, that is explained as background.
     pub(super) unseparated: f64,
     /// Some colours of the object, and of what is around it.
-    colours: [Vec<[f32; 3]>; 2],
+    pub(super) colours: [Vec<[f32; 3]>; 2],
 }
 
 impl Part {
