@@ -111,6 +111,15 @@ impl Capture {
         Ok(capture)
     }
 
+    /// Says whether a capture can be written to `dir`, before any work is done: nothing is there, or a capture that will
+    /// be replaced.
+    ///
+    /// # Errors
+    /// Where `dir` holds something that is no capture.
+    pub fn check_place(dir: &Path) -> Result<(), CaptureError> {
+        write::check_replaceable(dir)
+    }
+
     /// Writes `transforms.json` (nerfstudio convention), `images/` and `masks/` to the folder `dir`,
     /// which appears whole or not at all. An earlier capture of that name is replaced.
     ///

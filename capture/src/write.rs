@@ -51,7 +51,7 @@ pub(crate) fn write(
 }
 
 /// Refuses to replace what was not written here.
-fn check_replaceable(dir: &Path) -> Result<(), CaptureError> {
+pub(crate) fn check_replaceable(dir: &Path) -> Result<(), CaptureError> {
     if !dir.exists() {
         return Ok(());
     }

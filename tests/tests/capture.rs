@@ -110,7 +110,9 @@ fn complaint(path: &Path, more: &[&str]) -> String {
     let film = path.file_name().expect("a name").to_string_lossy();
     let run = turnlight(folder, &[&["capture", &*film, "-o", "capture"][..], more].concat());
     assert_eq!(run.code, Some(1), "{}{}", run.stdout, run.stderr);
-    assert!(!folder.join("capture").exists(), "a failed capture left something");
+    let left = std::fs::read_dir(folder).expect("a folder").map(|entry| entry.expect("an entry").file_name());
+    let left: Vec<_> = left.filter(|name| name.to_string_lossy() != film).collect();
+    assert!(left.is_empty(), "a failed capture left {left:?}");
     assert!(run.stderr.contains(&*film), "the file is not named: {}", run.stderr);
     run.stderr
 }
@@ -272,4 +274,51 @@ fn a_carried_camera_is_told_from_a_turntable() {
     let mean = mean_iou(&found, &drawn);
     println!("IoU {mean:.4}");
     assert!(mean > 0.95, "{mean}");
+}
+
+#[test]
+fn frames_before_the_board_is_seen_do_not_spoil_the_turn() {
+    let cartoon = Cartoon::default();
+    let angles = angles(40, 1.0);
+    let mut frames = images(&draw(&cartoon, &angles));
+    for frame in &mut frames[..3] {
+        *frame = Image::filled(frame.width(), frame.height(), [90, 80, 70]);
+    }
+    let (_folder, path) = film_of(&frames);
+    let found = captured(&path, &FootageOptions { board: Some(cartoon.board), ..FootageOptions::default() });
+    let ring = &found.selected.rings[0];
+    assert!(ring.turns.is_some() && ring.step_deg.is_some(), "{ring:?}");
+    assert!(found.selected.kept.len() > 34, "{:?}", found.selected.kept);
+}
+
+#[test]
+fn masks_and_cameras_from_elsewhere_go_by_name() {
+    let cartoon = Cartoon::default();
+    let drawn = draw(&cartoon, &angles(12, 0.95));
+    let folder = tempfile::tempdir().expect("a folder");
+    let (photographs, masks) = (folder.path().join("photographs"), folder.path().join("masks"));
+    [&photographs, &masks].iter().for_each(|folder| std::fs::create_dir(folder).expect("made"));
+    for (k, frame) in drawn.iter().enumerate() {
+        capture::write_rgb(&photographs.join(format!("p{k}.png")), &frame.image).expect("written");
+        capture::write_matte(&masks.join(format!("p{k}.png")), &frame.matte).expect("written");
+    }
+    let options = FootageOptions { masks: Some(masks.clone()), ..FootageOptions::default() };
+    let found = captured(&photographs, &options);
+    assert!(mean_iou(&found, &drawn) == 1.0 && found.kept.len() == 12);
+    let output = folder.path().join("first");
+    found.write(&found.report(&Footage::open(&[photographs.clone()]).expect("footage")), &output).expect("written");
+    drop(found);
+    // The capture just written gives the cameras of the same photographs, under its own names.
+    for (k, name) in (0..12).map(|k| (k, format!("{k:04}.png"))) {
+        std::fs::rename(photographs.join(format!("p{k}.png")), photographs.join(&name)).expect("renamed");
+        std::fs::rename(masks.join(format!("p{k}.png")), masks.join(&name)).expect("renamed");
+    }
+    let args = ["capture", "photographs", "--cameras", "first", "--masks", "masks", "-o", "second"];
+    let run = turnlight(folder.path(), &args);
+    assert_eq!(run.code, Some(0), "{}", run.stderr);
+    let second = capture::Capture::read(&folder.path().join("second")).expect("a capture");
+    assert_eq!(second.frames.len(), 12);
+    std::fs::remove_file(masks.join("0007.png")).expect("removed");
+    let run = turnlight(folder.path(), &args);
+    assert!(run.code == Some(1) && run.stderr.contains("0007.png"), "{}", run.stderr);
 }

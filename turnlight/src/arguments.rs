@@ -215,7 +215,7 @@ pub(crate) struct CaptureFootageArgs {
     /// Have an installed COLMAP find the cameras of photographs, without a board; give masks where the object turned
     #[arg(long, value_name = "PROGRAM", num_args = 0..=1, default_missing_value = "colmap", conflicts_with_all = ["cameras", "board", "square", "calibration", "motion"])]
     pub(crate) colmap: Option<PathBuf>,
-    /// Take silhouettes from this folder: NAME.png of a photograph, the frame's number of a film
+    /// Take silhouettes from this folder: NAME.png of a photograph, the frame's number, counted from 0, of a film
     #[arg(long, value_name = "DIR", conflicts_with = "clean_plate")]
     pub(crate) masks: Option<PathBuf>,
     /// Picture of the set without object and table, one for every film or folder
@@ -585,9 +585,11 @@ fn pixels(text: &str) -> Result<f64, String> {
 }
 
 fn circle(text: &str) -> Result<[f64; 3], String> {
-    let parts: Vec<f64> = text.split(',').filter_map(|part| part.trim().parse().ok()).collect();
+    let parts: Vec<Option<f64>> = text.split(',').map(|part| part.trim().parse().ok()).collect();
     match parts[..] {
-        [x, y, radius] if x.is_finite() && y.is_finite() && radius > 1.0 && radius.is_finite() => Ok([x, y, radius]),
+        [Some(x), Some(y), Some(radius)] if x.is_finite() && y.is_finite() && radius > 1.0 && radius.is_finite() => {
+            Ok([x, y, radius])
+        }
         _ => Err("needs column, row and radius of a circle in pixels, as in 320,240,25".to_owned()),
     }
 }

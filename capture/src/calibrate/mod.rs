@@ -265,6 +265,8 @@ pub struct FramePose {
 pub struct Filled {
     /// World to pixels.
     pub camera: Camera,
+    /// Position of the segment in [`Turntable::segments`] during which the camera stood there.
+    pub segment: usize,
     /// In radians, as [`Turntable::angles`].
     pub angle: f64,
     /// Standard deviation of the angle in radians.

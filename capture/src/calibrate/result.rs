@@ -153,16 +153,18 @@ impl Calibration {
     /// uncertain by more than a degree.
     pub fn camera_at(&self, film: usize, time_s: f64) -> Option<Filled> {
         let Motion::Turntable(turntable) = &self.motion else { return None };
-        let of_film = || turntable.segments.iter().filter(|s| s.film == film);
+        let of_film = || turntable.segments.iter().enumerate().filter(|(_, s)| s.film == film);
         let time = |k: usize| self.frames.get(k).map(|f| f.time_s);
-        let holds =
-            |s: &&Segment| time(s.first).is_some_and(|t| t <= time_s) && time(s.last).is_some_and(|t| time_s <= t);
+        let holds = |(_, s): &(usize, &Segment)| {
+            time(s.first).is_some_and(|t| t <= time_s) && time(s.last).is_some_and(|t| time_s <= t)
+        };
         // Before the first and after the last sighting the camera is taken to have stood where it was.
-        let before_all = of_film().next().filter(|s| time(s.first).is_some_and(|t| time_s < t));
-        let after_all = of_film().next_back().filter(|s| time(s.last).is_some_and(|t| time_s > t));
-        let segment = of_film().find(holds).or(before_all).or(after_all)?;
+        let before_all = of_film().next().filter(|(_, s)| time(s.first).is_some_and(|t| time_s < t));
+        let after_all = of_film().next_back().filter(|(_, s)| time(s.last).is_some_and(|t| time_s > t));
+        let (at, segment) = of_film().find(holds).or(before_all).or(after_all)?;
         let (angle, deviation) = turntable.track(segment, &self.frames).at(time_s)?;
-        Some(Filled { camera: camera(&self.intrinsics, &turned(&segment.pose, angle)), angle, deviation })
+        let camera = camera(&self.intrinsics, &turned(&segment.pose, angle));
+        Some(Filled { camera, segment: at, angle, deviation })
     }
 
     /// Cameras of the sightings that were not used, where the motion tells them.

@@ -31,6 +31,8 @@ pub enum Take {
 pub struct FrameSource {
     /// Position of its take.
     pub take: usize,
+    /// What its take is called: the film without its extension, or the folder of the photographs.
+    pub take_name: String,
     /// Counted from 0 within the take.
     pub index: usize,
     /// Seconds since the start of the take; of photographs, their number.
@@ -164,7 +166,9 @@ impl Frames<'_> {
         let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
         let named = |frame: crate::video::FilmFrame| {
             let name = format!("{name} frame {}", frame.index);
-            let source = FrameSource { take: self.take, index: frame.index, time_s: frame.time_s, name, file: None };
+            let take_name = path.file_stem().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+            let (index, time_s) = (frame.index, frame.time_s);
+            let source = FrameSource { take: self.take, take_name, index, time_s, name, file: None };
             FootageFrame { source, image: frame.image }
         };
         Some(frame.map(named))
@@ -208,7 +212,9 @@ fn photograph(take: usize, index: usize, file: &Path) -> Result<FootageFrame, Ca
 
 fn source_of(take: usize, index: usize, file: &Path) -> FrameSource {
     let name = file.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
-    FrameSource { take, index, time_s: index as f64, name, file: Some(file.to_owned()) }
+    let folder = file.parent().and_then(Path::file_name);
+    let take_name = folder.map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+    FrameSource { take, take_name, index, time_s: index as f64, name, file: Some(file.to_owned()) }
 }
 
 #[cfg(test)]

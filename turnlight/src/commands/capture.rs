@@ -18,6 +18,7 @@ pub(crate) fn run(args: &CaptureFootageArgs, observer: &dyn Observer) -> Result<
     if let Some(model) = &args.model {
         check_extension(model, &["glb"])?;
     }
+    Capture::check_place(&args.output)?;
     let footage = Footage::open(&args.footage)?;
     let mut stages = Stages::new(observer);
     let captured = capture_footage(&footage, &options(args)?, &args.output, &mut stages)?;

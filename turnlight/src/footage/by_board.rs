@@ -26,7 +26,7 @@ pub(super) fn find_cameras(
     let seen = look(footage, &pattern, "look", stages)?;
     let sightings = sightings(&seen);
     if sightings.len() < 2 {
-        return Err(too_few(footage, &pattern, &sightings, &seen));
+        return Err(too_few(footage, &described(&pattern, is_measured), &sightings, &seen));
     }
     let lens = lens(options, &pattern, seen.size, stages)?;
     let calibrate_options = CalibrateOptions {
@@ -127,15 +127,12 @@ fn sightings(seen: &Observations) -> Vec<Sighting> {
     .collect()
 }
 
-fn too_few(footage: &Footage, pattern: &Pattern, sightings: &[Sighting], seen: &Observations) -> Error {
+fn too_few(footage: &Footage, board: &str, sightings: &[Sighting], seen: &Observations) -> Error {
     let (found, of) = (sightings.len(), seen.frames.len());
-    let name = match pattern {
-        Pattern::Board(board) => board.to_string(),
-        Pattern::Markers(dictionary) => format!("markers of {dictionary}"),
-    };
+    let fault = seen.fault.as_ref().map(|fault| format!(" ({fault})")).unwrap_or_default();
     Error::Failed(format!(
-        "{}: {name} is seen in {found} of {of} frames; check that this is the board in the footage (leave --board away \
-         to have it found out), light it evenly, and film so that it stays in view",
+        "{}: {board} is seen in {found} of {of} frames{fault}; check that this is the board in the footage (leave --board \
+         away to have it found out), light it evenly, and film so that it stays in view",
         footage.path().display()
     ))
 }
@@ -169,6 +166,9 @@ fn lens(
     let calibration = found.map_err(|fault| Error::Failed(format!("{}: {fault}", shots.path().display())))?;
     stages.observer().noted(&lens_note(&calibration.intrinsics, calibration.rms_px));
     calibration.findings.iter().for_each(|finding| stages.observer().noted(finding));
+    if let Some(fault) = &seen.fault {
+        stages.observer().noted(&format!("the calibration shots are used as far as they go: {fault}"));
+    }
     Ok(LensKnowledge::Known(calibration.intrinsics))
 }
 
@@ -221,7 +221,7 @@ fn shots(seen: &Observations, calibration: &Calibration) -> Vec<Shot> {
     let mut poses = calibration.frames.iter().enumerate().peekable();
     let shot = |(at, frame): (usize, &Observed)| match poses.next_if(|(_, pose)| pose.frame == at) {
         Some((sighting, pose)) => sighted(frame, sighting, pose, turntable),
-        None => unsighted(frame, calibration, turntable),
+        None => unsighted(frame, calibration),
     };
     seen.frames.iter().enumerate().map(shot).collect()
 }
@@ -265,19 +265,15 @@ fn sighted(frame: &Observed, sighting: usize, pose: &FramePose, turntable: Optio
     }
 }
 
-fn unsighted(frame: &Observed, calibration: &Calibration, turntable: Option<&Turntable>) -> Shot {
+fn unsighted(frame: &Observed, calibration: &Calibration) -> Shot {
     let Some(filled) = calibration.camera_at(frame.source.take, frame.source.time_s) else {
         return Shot { fault: Some("the board is not seen".to_owned()), ..bare(frame) };
-    };
-    let stands = |segment: &capture::calibrate::Segment| {
-        let times = [segment.first, segment.last].map(|at| calibration.frames[at].time_s);
-        segment.film == frame.source.take && (times[0]..=times[1]).contains(&frame.source.time_s)
     };
     Shot {
         camera: Some(filled.camera),
         pose: PoseSource::Filled,
         angle: Some(filled.angle),
-        standpoint: turntable.and_then(|t| t.segments.iter().position(stands)),
+        standpoint: Some(filled.segment),
         ..bare(frame)
     }
 }

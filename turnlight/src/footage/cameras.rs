@@ -1,6 +1,6 @@
 //! Where the cameras of footage come from: a board in it, or elsewhere.
 
-use super::{FootageOptions, Shot, Shots};
+use super::{FootageOptions, Shot, Shots, silhouettes};
 use crate::Error;
 use crate::colmap::{self, ColmapOptions, Photograph};
 use crate::stages::Stages;
@@ -55,6 +55,7 @@ fn by_board(footage: &Footage, _: &FootageOptions, _: &mut Stages<'_>) -> Result
 fn calibrated(footage: &Footage, path: &Path, stages: &mut Stages<'_>) -> Result<Shots, Error> {
     let capture = Capture::read(path)?;
     let sources = photographs(footage)?;
+    refuse_twins(&sources)?;
     let cameras = sources.iter().map(|source| camera_of(source, &capture, path)).collect::<Result<Vec<_>, _>>()?;
     let cameras = cameras.into_iter().map(Some).collect();
     let shots = photographed(sources, cameras, format!("cameras of {}", path.display()), stages)?;
@@ -74,7 +75,8 @@ fn by_colmap(
         stages.observer().noted(note);
     }
     let photograph = |source: &FrameSource| {
-        let matte = options.masks.as_ref().map(|folder| super::silhouettes::given(folder, source)).transpose()?;
+        let takes = footage.takes.len();
+        let matte = options.masks.as_ref().map(|folder| silhouettes::given(folder, source, takes, None)).transpose()?;
         Ok(Photograph { image: source.file.clone().unwrap_or_default(), matte })
     };
     let pictures = sources.iter().map(photograph).collect::<Result<Vec<_>, Error>>()?;
@@ -94,13 +96,15 @@ fn photographed(
     told_by: String,
     stages: &mut Stages<'_>,
 ) -> Result<Shots, Error> {
-    let look = |source: &FrameSource| match &source.file {
-        Some(file) => Ok(choose::sharpness(&read_upright(file)?)),
-        None => Ok(0.0),
+    let size = cameras.iter().flatten().next().map_or([0, 0], |c| [c.intrinsics.width, c.intrinsics.height]);
+    let look = |source: &FrameSource| {
+        let Some(file) = &source.file else { return Ok(0.0) };
+        let image = read_upright(file)?;
+        silhouettes::check_size(file, [image.width(), image.height()], size)?;
+        Ok(choose::sharpness(&image))
     };
     let sharpness: Vec<Result<f64, Error>> = stages.run("look", |_| sources.par_iter().map(look).collect());
     let mut shots = Vec::new();
-    let size = cameras.iter().flatten().next().map_or([0, 0], |c| [c.intrinsics.width, c.intrinsics.height]);
     for ((source, camera), sharpness) in sources.into_iter().zip(cameras).zip(sharpness) {
         shots.push(Shot {
             source,
@@ -127,6 +131,18 @@ fn photographs(footage: &Footage) -> Result<Vec<FrameSource>, Error> {
         return Err(Error::Arguments(format!("{}: {fault}; give its frames as a folder", footage.path().display())));
     }
     Ok(footage.photographs())
+}
+
+/// Photographs of the same name cannot be told apart by it.
+fn refuse_twins(sources: &[FrameSource]) -> Result<(), Error> {
+    let mut names = std::collections::BTreeSet::new();
+    match sources.iter().find(|source| !names.insert(source.name.to_lowercase())) {
+        None => Ok(()),
+        Some(twin) => {
+            let fault = format!("{}: two photographs have this name, and cameras are found by it", twin.name);
+            Err(Error::Arguments(format!("{fault}; give their folders one by one, or rename them")))
+        }
+    }
 }
 
 /// The camera of the frame of the same name.

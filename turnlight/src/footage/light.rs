@@ -15,8 +15,8 @@ use std::f64::consts::TAU;
 /// The light of footage.
 #[derive(Clone, Debug)]
 pub struct FootageLight {
-    /// What the shading of the object says.
-    pub check: LightCheck,
+    /// What the shading of the object says; `None` where the silhouettes leave no shape.
+    pub check: Option<LightCheck>,
     /// Per frame chosen, unit direction towards the light in the world, where a ball shows it.
     pub directions: Vec<Option<Vector3<f64>>>,
 }
@@ -35,7 +35,7 @@ pub(super) fn find(
     kept: &[usize],
     silhouettes: &Silhouettes,
     options: &FootageOptions,
-) -> Result<Option<FootageLight>, Error> {
+) -> Result<FootageLight, Error> {
     let directions = directions(pictures, shots, kept, options)?;
     let usable = |&at: &usize| !silhouettes.contradicting.contains(&at) && has_object(silhouettes, at);
     let usable: Vec<usize> = (0..kept.len()).filter(usable).collect();
@@ -43,7 +43,7 @@ pub(super) fn find(
     let views: Vec<_> = usable.par_iter().map(view).collect::<Vec<_>>().into_iter().collect::<Result<_, Error>>()?;
     let views: Vec<View> = views.into_iter().flatten().collect();
     let check = shading(&views, shots, kept, silhouettes);
-    Ok(check.map(|check| FootageLight { check, directions }))
+    Ok(FootageLight { check, directions })
 }
 
 fn has_object(silhouettes: &Silhouettes, at: usize) -> bool {
@@ -88,6 +88,15 @@ fn azimuth(camera: &Camera) -> f64 {
     centre.y.atan2(centre.x)
 }
 
+/// Refuses a ball that cannot be: it stands in the room, at one place of the picture while the camera stands still.
+pub(super) fn check_ball(shots: &Shots, options: &FootageOptions) -> Result<(), Error> {
+    if options.light_ball.is_none() || shots.standpoints().len() == 1 {
+        return Ok(());
+    }
+    let fault = "--light-ball: has to stand before a camera that stands still, and this one was carried or moved";
+    Err(Error::Arguments(format!("{fault}; leave it away, or give the films one by one")))
+}
+
 /// Where the highlight of the ball says the light is. The ball stands in the room: its outline is the same in all frames
 /// of a camera that stands still.
 fn directions(
@@ -97,11 +106,6 @@ fn directions(
     options: &FootageOptions,
 ) -> Result<Vec<Option<Vector3<f64>>>, Error> {
     let Some([x, y, radius]) = options.light_ball else { return Ok(vec![None; kept.len()]) };
-    if shots.turntable().is_none() {
-        let fault =
-            "--light-ball: the ball has to stand before a camera that stands still, and this camera was carried";
-        return Err(Error::Arguments(fault.to_owned()));
-    }
     let on_outline = |k: usize| {
         let angle = TAU * k as f64 / OUTLINE as f64;
         Point2::new(x + radius * angle.cos(), y + radius * angle.sin())

@@ -70,8 +70,9 @@ pub struct CapturedFootage {
     pub silhouettes: Silhouettes,
     /// Positions among the frames chosen of those in the capture.
     pub kept: Vec<usize>,
-    /// What the light is fixed to; `None` where there is no object to see it on.
-    pub light: Option<FootageLight>,
+    /// What the light is fixed to, and where it is.
+    pub light: FootageLight,
+    light_ball: bool,
     pictures: Pictures,
 }
 
@@ -86,13 +87,16 @@ pub fn capture_footage(
     stages: &mut Stages<'_>,
 ) -> Result<CapturedFootage, Error> {
     let shots = cameras::find_cameras(footage, options, stages)?;
+    light::check_ball(&shots, options)?;
     let selected = select::select(&shots, options);
     let sources: Vec<_> = selected.kept.iter().map(|&at| shots.shots[at].source.clone()).collect();
     if sources.is_empty() {
         let fault = format!("{}: no frame can be used", footage.path().display());
-        return Err(Error::Failed(format!("{fault}; {}", selected.why_none())));
+        let remedy = "film sharper and slower, with the board in view all the time";
+        return Err(Error::Failed(format!("{fault} ({}); {remedy}", selected.why_none())));
     }
     let beside = crate::output::parent(output);
+    std::fs::create_dir_all(beside).map_err(|e| Error::Failed(format!("{}: {e}; choose another", beside.display())))?;
     let pictures = stages.run("take frames", |observer| Pictures::extract(footage, &sources, beside, observer))?;
     let silhouettes = stages.run("silhouettes", |_| silhouettes::find(&pictures, &shots, &selected.kept, options))?;
     refuse_useless(footage, &selected, &silhouettes)?;
@@ -102,12 +106,13 @@ pub fn capture_footage(
     let frame = |&at: &usize| {
         let camera = shots.shots[selected.kept[at]].camera?;
         let image_path = pictures.file(at).to_owned();
-        let light_direction = light.as_ref().and_then(|light| light.directions[at]);
+        let light_direction = light.directions[at];
         Some(Frame { image_path, mask_path: None, camera, light_direction, exposure: None })
     };
+    let light_ball = options.light_ball.is_some();
     let frames: Vec<Frame> = kept.iter().filter_map(frame).collect();
     let capture = Capture { frames, aabb: silhouettes.aabb, unit: shots.unit, mask_source: MaskSource::Automatic };
-    Ok(CapturedFootage { capture, shots, selected, silhouettes, kept, light, pictures })
+    Ok(CapturedFootage { capture, shots, selected, silhouettes, kept, light, light_ball, pictures })
 }
 
 /// Without an object, or with a single view of it, there is nothing to write.
@@ -115,7 +120,14 @@ fn refuse_useless(footage: &Footage, selected: &Selected, silhouettes: &Silhouet
     let views = selected.kept.len() - silhouettes.contradicting.len();
     let fault = match (silhouettes.aabb, views) {
         (None, _) => silhouettes.findings.join("; "),
-        (Some(_), 0..2) => format!("{views} view can be used; {}", selected.why_none()),
+        (Some(_), 0..2) => {
+            let left_out = silhouettes.contradicting.len();
+            format!(
+                "{views} view can be used ({left_out} silhouettes contradict the others; {}); film all around the object, \
+                 sharp, with the board in view",
+                selected.why_none()
+            )
+        }
         _ => return Ok(()),
     };
     Err(Error::Failed(format!("{}: {fault}", footage.path().display())))

@@ -34,8 +34,8 @@ impl Pictures {
         let mut written = 0;
         while wanted.peek().is_some() {
             let mut batch: Vec<(FootageFrame, &PathBuf)> = Vec::new();
-            // Beyond a fault there is nothing that could have been chosen.
-            for frame in frames.by_ref().map_while(Result::ok) {
+            for frame in frames.by_ref() {
+                let frame = frame?;
                 let is_wanted = |(source, _): &(&FrameSource, &PathBuf)| {
                     (source.take, source.index) == (frame.source.take, frame.source.index)
                 };

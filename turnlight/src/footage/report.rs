@@ -23,7 +23,6 @@ impl CapturedFootage {
     pub fn report(&self, footage: &Footage) -> FootageReport {
         let calibration = self.shots.calibration.as_ref();
         let is_film = footage.has_film();
-        let last = self.shots.shots.last().map(|shot| shot.source.time_s);
         FootageReport {
             footage: footage.path().display().to_string(),
             motion: match calibration {
@@ -31,7 +30,7 @@ impl CapturedFootage {
                 Some(_) => FootageMotion::FreeHand,
                 None => FootageMotion::Unknown,
             },
-            duration_s: last.filter(|_| is_film),
+            duration_s: is_film.then(|| self.duration()),
             size: self.shots.size,
             frames: self.frames(is_film),
             coverage: self.coverage(),
@@ -48,7 +47,7 @@ impl CapturedFootage {
                 Evidence::Given => "masks given",
             }
             .to_owned(),
-            light: self.light.as_ref().map(|light| light.check),
+            light: self.light.check,
             aabb: self.capture.aabb.map(|aabb| [aabb.min.into(), aabb.max.into()]),
             unit: self.shots.unit,
             findings: self.findings(),
@@ -90,6 +89,7 @@ impl CapturedFootage {
             let is_told = shot.corners > 0;
             FrameReport {
                 position,
+                name: shot.source.name.clone(),
                 time_s: is_film.then_some(shot.source.time_s),
                 kept,
                 dropped,
@@ -107,14 +107,25 @@ impl CapturedFootage {
         self.shots.shots.iter().enumerate().map(frame).collect()
     }
 
+    /// Seconds of all films together.
+    fn duration(&self) -> f64 {
+        let mut ends: BTreeMap<usize, f64> = BTreeMap::new();
+        for shot in &self.shots.shots {
+            ends.insert(shot.source.take, shot.source.time_s);
+        }
+        ends.values().sum()
+    }
+
     fn sharp(&self) -> f64 {
         let mut all: Vec<f64> = self.shots.shots.iter().map(|shot| shot.sharpness).collect();
         all.sort_by(f64::total_cmp);
         all.get((SHARP * all.len() as f64) as usize).copied().unwrap_or(0.0)
     }
 
+    /// What directions are counted from: on the axis, if there is one.
     fn middle(&self) -> Point3<f64> {
-        self.capture.aabb.map_or_else(Point3::origin, |aabb| aabb.center())
+        let middle = self.capture.aabb.map_or_else(Point3::origin, |aabb| aabb.center());
+        if self.shots.turntable().is_some() { Point3::new(0.0, 0.0, middle.z) } else { middle }
     }
 
     /// Of the ring with the most frames.
@@ -170,6 +181,12 @@ impl CapturedFootage {
                  another colour, or give masks (--masks)",
                 100.0 * mean
             );
+            findings.push(Finding { severity: Severity::Warning, text });
+        }
+        let (shown, frames) = (self.light.directions.iter().flatten().count(), self.light.directions.len());
+        if self.light_ball && shown < frames {
+            let text =
+                format!("The ball shows the light in {shown} of {frames} frames only: check where its outline is.");
             findings.push(Finding { severity: Severity::Warning, text });
         }
         let note = |text: &String| Finding { severity: Severity::Note, text: text.clone() };

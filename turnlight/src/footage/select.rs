@@ -32,6 +32,8 @@ pub(super) fn select(shots: &Shots, options: &FootageOptions) -> Selected {
         ChooseOptions { most: shots.shots.len(), min_step_deg: PHOTOGRAPH_STEP_DEG, ..of_film }
     };
     let most = (options.most.unwrap_or(usual.most * groups.len()) / groups.len()).max(1);
+    // Whoever asks for more than usual means it.
+    let usual = ChooseOptions { min_step_deg: usual.min_step_deg.min(360.0 / most as f64), ..usual };
     let mut selected = Selected::default();
     for members in &groups {
         let frames: Vec<FilmFrame> = members.iter().map(|&at| film_frame(shots, at)).collect();
@@ -48,10 +50,10 @@ pub(super) fn select(shots: &Shots, options: &FootageOptions) -> Selected {
 }
 
 impl Selected {
-    /// What most often kept frames out, as a remedy.
+    /// What most often kept frames out.
     pub(super) fn why_none(&self) -> String {
         let count = |reason: DropReason| self.dropped.iter().filter(|d| d.reason == reason).count();
-        let reasons = [DropReason::NoPose, DropReason::RejectedPose, DropReason::Blurred];
+        let reasons = [DropReason::NoPose, DropReason::RejectedPose, DropReason::Blurred, DropReason::TooClose];
         let worst = reasons.into_iter().max_by_key(|&reason| count(reason));
         worst.map_or_else(String::new, |reason| format!("{} of {} frames: {reason}", count(reason), self.dropped.len()))
     }

@@ -55,6 +55,11 @@ pub struct Shots {
 }
 
 impl Shots {
+    /// How many films and folders the frames are from.
+    pub fn takes(&self) -> usize {
+        self.shots.iter().map(|shot| shot.source.take + 1).max().unwrap_or(0)
+    }
+
     /// The turntable, if it was one.
     pub fn turntable(&self) -> Option<&Turntable> {
         match &self.calibration.as_ref()?.motion {
@@ -66,10 +71,5 @@ impl Shots {
     /// Where the camera stood while the table turned, one after the other.
     pub fn standpoints(&self) -> &[Segment] {
         self.turntable().map(|t| &t.segments[..]).unwrap_or_default()
-    }
-
-    /// Frames with a camera of their own or from the motion.
-    pub fn posed(&self) -> usize {
-        self.shots.iter().filter(|shot| matches!(shot.pose, PoseSource::Measured | PoseSource::Filled)).count()
     }
 }

@@ -18,8 +18,9 @@ pub(super) fn find(
     let setup = setup(shots, kept, options)?;
     match &options.masks {
         Some(folder) => {
-            let mattes =
-                kept.iter().map(|&at| given(folder, &shots.shots[at].source)).collect::<Result<Vec<_>, _>>()?;
+            let takes = shots.takes();
+            let mask = |&at: &usize| given(folder, &shots.shots[at].source, takes, Some(shots.size));
+            let mattes = kept.iter().map(mask).collect::<Result<Vec<_>, _>>()?;
             Ok(check_silhouettes(&mattes, &setup)?)
         }
         None => Ok(find_silhouettes(&|at| pictures.read(at), &setup, &SilhouetteOptions::default())?),
@@ -27,25 +28,58 @@ pub(super) fn find(
 }
 
 fn setup(shots: &Shots, kept: &[usize], options: &FootageOptions) -> Result<StageSetup, Error> {
-    let clean_plates = options.clean_plates.iter().map(|path| Ok(Some(clean_plate(path, shots.size)?)));
+    // Standpoints of which no frame was kept are none.
+    let mut standpoints: Vec<usize> = kept.iter().filter_map(|&at| shots.shots[at].standpoint).collect();
+    standpoints.sort_unstable();
+    standpoints.dedup();
+    let segment = |&at: &usize| shots.shots[at].standpoint.and_then(|s| standpoints.binary_search(&s).ok());
     Ok(StageSetup {
         cameras: kept.iter().filter_map(|&at| shots.shots[at].camera).collect(),
-        segments: kept.iter().map(|&at| shots.shots[at].standpoint).collect(),
+        segments: kept.iter().map(segment).collect(),
         has_plane: shots.has_plane,
         print: shots.print,
-        clean_plates: clean_plates.collect::<Result<_, Error>>()?,
+        clean_plates: clean_plates(shots, &standpoints, options)?,
         aabb: None,
+        numbers: kept.to_vec(),
     })
 }
 
-fn clean_plate(path: &Path, [width, height]: [usize; 2]) -> Result<Image<[u8; 3]>, Error> {
-    let plate = read_upright(path)?;
-    check_size(path, [plate.width(), plate.height()], [width, height]).map(|()| plate)
+/// Per standpoint the plate of its take: of a camera that was moved within a take only where it stood first.
+fn clean_plates(
+    shots: &Shots,
+    standpoints: &[usize],
+    options: &FootageOptions,
+) -> Result<Vec<Option<Image<[u8; 3]>>>, Error> {
+    if options.clean_plates.is_empty() {
+        return Ok(Vec::new());
+    }
+    let segments = shots.standpoints();
+    if segments.is_empty() || options.clean_plates.len() > shots.takes() {
+        let fault = "--clean-plate: shows the set before a camera that stands still, one for every film or folder";
+        return Err(Error::Arguments(format!("{fault}; leave it away for a camera that was carried")));
+    }
+    let plate = |&at: &usize| {
+        let is_first = segments.iter().position(|s| s.film == segments[at].film) == Some(at);
+        let path = options.clean_plates.get(segments[at].film).filter(|_| is_first);
+        path.map(|path| clean_plate(path, shots.size)).transpose()
+    };
+    standpoints.iter().map(plate).collect()
 }
 
-/// The mask of a frame: `NAME.png`, `NAME.EXT.png` or `NAME.mask.png` of a photograph, the number of the frame (any
-/// number of leading zeros) of a film.
-pub(super) fn given(folder: &Path, source: &FrameSource) -> Result<Image<u8>, Error> {
+fn clean_plate(path: &Path, size: [usize; 2]) -> Result<Image<[u8; 3]>, Error> {
+    let plate = read_upright(path)?;
+    check_size(path, [plate.width(), plate.height()], size).map(|()| plate)
+}
+
+/// The mask of a frame: `NAME.png`, `NAME.EXT.png` or `NAME.mask.png` of a photograph, the number of the frame counted
+/// from 0 (any number of leading zeros) of a film. Of several takes each has a folder of its name.
+pub(super) fn given(
+    folder: &Path,
+    source: &FrameSource,
+    takes: usize,
+    size: Option<[usize; 2]>,
+) -> Result<Image<u8>, Error> {
+    let folder = if takes > 1 { folder.join(&source.take_name) } else { folder.to_owned() };
     let names = match &source.file {
         Some(file) => {
             let part = |p: Option<&std::ffi::OsStr>| p.map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
@@ -59,13 +93,19 @@ pub(super) fn given(folder: &Path, source: &FrameSource) -> Result<Image<u8>, Er
         let fault = format!("{}: has no mask for {} (looked for {})", folder.display(), source.name, names.join(", "));
         Error::Failed(format!("{fault}; add it, or leave the frame out of the footage"))
     };
-    Ok(read_matte(&path.ok_or_else(missing)?)?)
+    let path = path.ok_or_else(missing)?;
+    let mask = read_matte(&path)?;
+    if let Some(size) = size {
+        check_size(&path, [mask.width(), mask.height()], size)?;
+    }
+    Ok(mask)
 }
 
-fn check_size(path: &Path, [w, h]: [usize; 2], [width, height]: [usize; 2]) -> Result<(), Error> {
+/// Refuses a picture of another size than the frames.
+pub(super) fn check_size(path: &Path, [w, h]: [usize; 2], [width, height]: [usize; 2]) -> Result<(), Error> {
     if [w, h] == [width, height] {
         return Ok(());
     }
-    let fault = format!("{}: is {w}x{h}, the frames are {width}x{height}", path.display());
+    let fault = format!("{}: is {w}x{h}, the frames (or their cameras) are {width}x{height}", path.display());
     Err(Error::Failed(format!("{fault}; make it of the same size")))
 }

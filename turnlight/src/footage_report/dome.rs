@@ -1,6 +1,6 @@
 //! Directions of view, seen from above: the zenith in the middle, the horizon at the rim.
 
-use super::{FootageMotion, FootageReport, FrameReport};
+use super::{FootageReport, FrameReport};
 use capture::choose::azimuth;
 use nalgebra::Vector3;
 use std::fmt::Write;
@@ -39,13 +39,14 @@ pub(super) fn svg(report: &FootageReport) -> Option<String> {
     Some(svg)
 }
 
-/// Of a turntable the turn of the platter, so that the plot speaks of the angles the report names.
+/// The side from which the object is seen: gaps are named so too.
 fn seen(report: &FootageReport, frame: &FrameReport) -> Option<Seen> {
     let up = Vector3::from(report.coverage.up).try_normalize(1e-12)?;
     let direction = Vector3::from(frame.direction?).try_normalize(1e-12)?;
-    let turn = frame.angle_deg.filter(|_| report.motion == FootageMotion::Turntable);
-    let azimuth = turn.unwrap_or_else(|| azimuth(&direction, &up).to_degrees());
-    Some(Seen { azimuth, elevation: direction.dot(&up).clamp(-1.0, 1.0).asin().to_degrees() })
+    Some(Seen {
+        azimuth: azimuth(&direction, &up).to_degrees(),
+        elevation: direction.dot(&up).clamp(-1.0, 1.0).asin().to_degrees(),
+    })
 }
 
 /// Where a direction lies in the plot; below the horizon it goes on outwards.

@@ -72,6 +72,8 @@ pub enum FootageMotion {
 pub struct FrameReport {
     /// Position in the footage.
     pub position: usize,
+    /// The file of a photograph, or film and number.
+    pub name: String,
     /// Since the start of the film.
     pub time_s: Option<f64>,
     /// Position in the capture; `None` where it was left out.

@@ -6,6 +6,7 @@ fn frame(position: usize) -> FrameReport {
     let angle = 30.0 * position as f64;
     FrameReport {
         position,
+        name: format!("film.mp4 frame {position}"),
         time_s: Some(0.5 * position as f64),
         kept: Some(position),
         dropped: None,
@@ -175,12 +176,12 @@ fn footage_that_gave_nothing_has_a_page_too() {
 }
 
 #[test]
-fn free_hand_footage_is_drawn_where_the_camera_was() {
+fn frames_are_drawn_where_the_camera_was() {
     let carried = FootageReport { motion: FootageMotion::FreeHand, axis: None, ..report() };
     let page = html(&carried, &[]);
     // Frame 3 was turned by 90°; its camera was at −y, half as high as far.
     assert!(page.contains("frame 3: 270.0°, 26.6° up"), "direction, not turn");
-    assert!(html(&report(), &[]).contains("frame 3: 90.0°, 26.6° up"));
+    assert!(html(&report(), &[]).contains("frame 3: 270.0°, 26.6° up"), "of a turntable too");
     assert!(carried.verdict()[0].contains("carried all around"));
 }
 

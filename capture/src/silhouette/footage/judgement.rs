@@ -125,12 +125,15 @@ pub(super) fn iou(a: &Image<u8>, b: &Image<u8>) -> f64 {
 
 /// The answer at full size, and what to say of it.
 pub(super) fn summed_up(found: Found, gains: Vec<[f64; 3]>, setup: &StageSetup, evidence: Evidence) -> Silhouettes {
-    let findings = findings(&found);
+    let findings = findings(&found, setup);
+    let is_empty = |part: &Part| !part.matte.pixels().iter().any(|&v| v >= 128);
+    let is_left_out = |i: &usize| found.contradicting.contains(i) || is_empty(&found.parts[*i]);
+    let contradicting = (0..found.parts.len()).filter(is_left_out).collect();
     let back = |(part, camera): (&Part, &Camera)| part.cutout.back(&part.matte, camera, 0);
     Silhouettes {
         mattes: found.parts.iter().zip(&setup.cameras).map(back).collect(),
         agreement: found.agreement,
-        contradicting: found.contradicting,
+        contradicting,
         gains,
         aabb: found.belief.map(|b| b.bounds),
         evidence,
@@ -162,8 +165,12 @@ pub(super) fn camouflage<'a>(found: &Found, cloths: impl Iterator<Item = &'a Clo
     })
 }
 
-fn findings(found: &Found) -> Vec<String> {
+fn findings(found: &Found, setup: &StageSetup) -> Vec<String> {
     let mut findings = Vec::new();
+    let listed = |frames: &[usize]| {
+        let numbers: Vec<usize> = frames.iter().map(|&i| setup.numbers.get(i).copied().unwrap_or(i)).collect();
+        listed(&numbers)
+    };
     let frames = |which: &dyn Fn(usize, &Part) -> bool| -> Vec<usize> {
         found.parts.iter().enumerate().filter(|(i, p)| which(*i, p)).map(|(i, _)| i).collect()
     };
@@ -185,13 +192,13 @@ fn findings(found: &Found) -> Vec<String> {
         ));
     }
     if !empty.is_empty() {
-        findings.push(format!("nothing of the object was found in frames {}: leave them out", listed(&empty)));
+        findings.push(format!("nothing of the object was found in frames {}: they are left out", listed(&empty)));
     }
     let contradicting: Vec<usize> = found.contradicting.iter().copied().filter(|i| !empty.contains(i)).collect();
     if !contradicting.is_empty() {
         findings.push(format!(
             "the silhouettes of frames {} contradict the others: a wrong camera, a hand in the picture, or the object \
-             was moved; leave them out",
+             was moved; they are left out",
             listed(&contradicting)
         ));
     }

@@ -67,7 +67,7 @@ pub struct Silhouettes {
     pub mattes: Vec<Image<u8>>,
     /// Per frame the IoU with the hull of the others, 0 to 1.
     pub agreement: Vec<f64>,
-    /// Frames whose silhouette contradicts the others, ascending.
+    /// Frames whose silhouette is empty or contradicts the others, ascending.
     pub contradicting: Vec<usize>,
     /// Per frame the factors on linear red, green and blue that even out exposure and white balance; median 1.
     pub gains: Vec<[f64; 3]>,

@@ -59,6 +59,8 @@ pub struct StageSetup {
     pub clean_plates: Vec<Option<Image<[u8; 3]>>>,
     /// A box around the object, where known.
     pub aabb: Option<Aabb>,
+    /// What the frames are called in findings; their positions where it is empty.
+    pub numbers: Vec<usize>,
 }
 
 impl StageSetup {
