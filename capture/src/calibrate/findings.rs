@@ -167,14 +167,16 @@ fn left_out(result: &Calibration) -> Vec<String> {
     found
 }
 
-/// How far learnt markers rise out of the plane nearest to them.
+/// How far learnt markers rise out of the plane nearest to them, in parts of their side: lengths may have no unit.
 fn relief(estimate: &Estimate) -> Option<String> {
-    let (Shape::Squares { is_flat: false, .. }, Some(plane)) = (&estimate.rig.shape, &estimate.plane) else {
+    let (Shape::Squares { is_flat: false, side, .. }, Some(plane)) = (&estimate.rig.shape, &estimate.plane) else {
         return None;
     };
     let heights = estimate.rig.shape.points().into_iter().map(|p| plane.inverse_transform_point(&p).z.abs());
-    let most = 1000.0 * heights.fold(0.0, f64::max);
-    Some(format!("The markers are up to {most:.1} mm out of their plane, as paper that curls; taken into account."))
+    let percent = 100.0 * heights.fold(0.0, f64::max) / side;
+    Some(format!(
+        "The markers are up to {percent:.0} % of their side out of their plane, as paper that curls; taken into account."
+    ))
 }
 
 /// Whether corners reach over the picture, as distortion is only known where they are.

@@ -21,6 +21,25 @@ fn photographs_come_in_the_order_of_their_numbers() {
 }
 
 #[test]
+fn masks_beside_photographs_are_no_photographs() {
+    let names = ["p1.png", "p1.mask.png", "p2.png", "p2.mask.png", "dynamic_mask_p1.png"];
+    let folder = folder_of(&names.map(|name| (name, [4, 3])));
+    let footage = Footage::open(&[folder.path().to_owned()]).unwrap();
+    let found: Vec<String> = footage.photographs().into_iter().map(|source| source.name).collect();
+    assert_eq!(found, ["p1.png", "p2.png"]);
+}
+
+#[test]
+fn photographs_and_films_in_one_folder_are_refused() {
+    let folder = folder_of(&[("1.png", [4, 3]), ("2.png", [4, 3])]);
+    std::fs::write(folder.path().join(".a.mp4"), "hidden").unwrap();
+    assert!(Footage::open(&[folder.path().to_owned()]).is_ok());
+    std::fs::write(folder.path().join("a.MP4"), "text").unwrap();
+    let fault = Footage::open(&[folder.path().to_owned()]).unwrap_err().to_string();
+    assert!(fault.contains("photographs (2)") && fault.contains("films (1)"), "{fault}");
+}
+
+#[test]
 fn folders_are_takes_and_photographs_named_one_by_one_are_one() {
     let (a, b) = (folder_of(&[("1.png", [4, 3])]), folder_of(&[("1.png", [4, 3]), ("2.png", [4, 3])]));
     let takes = |paths: &[PathBuf]| -> Vec<usize> {

@@ -235,7 +235,7 @@ fn nearest_rotation(matrix: Matrix3<f64>) -> Matrix3<f64> {
     }
 }
 
-const IMAGE_EXTENSIONS: [&str; 12] =
+pub(crate) const IMAGE_EXTENSIONS: [&str; 12] =
     ["png", "jpg", "jpeg", "ppm", "pgm", "pnm", "PNG", "JPG", "JPEG", "PPM", "PGM", "PNM"];
 
 /// The images in a folder, masks left out, in the order a person counts.
@@ -305,7 +305,7 @@ fn shortened(word: &str) -> String {
     word.chars().take(40).collect()
 }
 
-fn list(folder: &Path) -> Result<Vec<PathBuf>, CaptureError> {
+pub(crate) fn list(folder: &Path) -> Result<Vec<PathBuf>, CaptureError> {
     let entries = std::fs::read_dir(folder).map_err(|e| CaptureError::io(folder, e))?;
     entries.map(|entry| entry.map(|e| e.path()).map_err(|e| CaptureError::io(folder, e))).collect()
 }

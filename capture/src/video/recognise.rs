@@ -42,7 +42,8 @@ pub fn recognise_pattern(images: &[Image<[u8; 3]>]) -> Result<Option<Pattern>, C
     seen.iter_mut().for_each(|markers| markers.retain(|m| known.contains(&m.id)));
     seen.retain(|markers| markers.len() >= FEWEST);
     let Some(&highest) = known.last().filter(|_| !seen.is_empty()) else {
-        return Ok(Some(Pattern::Markers(dictionary)));
+        // A square of a chessboard, or something in the room, may be misread as a marker.
+        return Ok(Some(chessboard(images)?.map_or(Pattern::Markers(dictionary), Pattern::Board)));
     };
     let board = candidates(dictionary, highest).par_bridge().filter_map(|board| Some((misfit(&board, &seen)?, board)));
     // Ties go to the board of fewer columns, whatever thread found it.

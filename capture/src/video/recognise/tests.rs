@@ -49,6 +49,30 @@ fn every_kind_of_board_is_found_out_by_looking_at_it() {
     }
 }
 
+/// Puts marker 3 of a dictionary into the upper left corner of a picture, 48 pixels wide.
+fn put_marker(image: &mut Image<[u8; 3]>, dictionary: Dictionary) {
+    let board = Board::ArucoGrid { columns: 4, rows: 1, marker: 1.0, gap: 0.5, dictionary };
+    let top_left = board.markers()[3].corners[0];
+    for (x, y) in (0..48).flat_map(|y| (0..48).map(move |x| (x, y))) {
+        let place = Point2::new(top_left.x + (x as f64 + 0.5) / 48.0, top_left.y - (y as f64 + 0.5) / 48.0);
+        image.set(16 + x, 16 + y, if board.is_dark(place) { [35; 3] } else { [205; 3] });
+    }
+}
+
+#[test]
+fn one_marker_beside_a_chessboard_does_not_hide_it() {
+    let board: Board = "chessboard:10x7:25mm".parse().unwrap();
+    let dictionary = "4x4_50".parse().unwrap();
+    let mut images = pictures(&board);
+    put_marker(&mut images[1], dictionary);
+    assert_eq!(guess_dictionary(&images).unwrap(), Some(dictionary));
+    assert_eq!(recognise_pattern(&images).unwrap(), Some(Pattern::Board(in_squares(&board))));
+    // Alone it is what there is.
+    let mut alone = Image::filled(640, 480, [205; 3]);
+    put_marker(&mut alone, dictionary);
+    assert_eq!(recognise_pattern(&[alone]).unwrap(), Some(Pattern::Markers(dictionary)));
+}
+
 #[test]
 fn markers_in_no_order_are_left_in_none() {
     // Of a grid each picture shows every other marker moved: no board fits.
