@@ -164,7 +164,7 @@ fn a_film_cut_short_is_used_as_far_as_it_goes_or_refused() {
     write_film(&path, &frames);
     let whole = std::fs::read(&path).expect("a film");
     std::fs::write(&path, &whole[..whole.len() * 6 / 10]).expect("cut");
-    let found = captured(&path, &FootageOptions::default());
+    let found = captured(&path, &FootageOptions { most: Some(8), ..FootageOptions::default() });
     assert!(found.shots.shots.len() < 20);
     assert!(found.shots.findings.iter().any(|finding| finding.contains("cut off")), "{:?}", found.shots.findings);
 }
@@ -210,7 +210,7 @@ fn a_camera_that_was_knocked_stands_in_two_places() {
     let mut drawn = draw(&cartoon, &angles[..20]);
     drawn.extend(draw(&knocked, &angles[20..]));
     let (_folder, path) = film_of(&images(&drawn));
-    let found = captured(&path, &FootageOptions::default());
+    let found = captured(&path, &FootageOptions { most: Some(12), ..FootageOptions::default() });
     assert_eq!(found.shots.standpoints().len(), 2, "{:?}", found.shots.findings);
     assert!(found.shots.standpoints()[1].first.abs_diff(20) <= 1);
     assert!(found.shots.findings.iter().any(|f| f.contains("20") && f.contains("moved")), "{:?}", found.shots.findings);
@@ -285,10 +285,11 @@ fn frames_before_the_board_is_seen_do_not_spoil_the_turn() {
         *frame = Image::filled(frame.width(), frame.height(), [90, 80, 70]);
     }
     let (_folder, path) = film_of(&frames);
-    let found = captured(&path, &FootageOptions { board: Some(cartoon.board), ..FootageOptions::default() });
+    let options = FootageOptions { board: Some(cartoon.board), most: Some(10), ..FootageOptions::default() };
+    let found = captured(&path, &options);
     let ring = &found.selected.rings[0];
-    assert!(ring.turns.is_some() && ring.step_deg.is_some(), "{ring:?}");
-    assert!(found.selected.kept.len() > 34, "{:?}", found.selected.kept);
+    assert!(ring.turns.is_some_and(|turns| turns > 0.8) && ring.step_deg.is_some(), "{ring:?}");
+    assert_eq!(found.selected.kept.len(), 10, "{:?}", found.selected.kept);
 }
 
 #[test]
@@ -304,7 +305,7 @@ fn masks_and_cameras_from_elsewhere_go_by_name() {
     }
     let options = FootageOptions { masks: Some(masks.clone()), ..FootageOptions::default() };
     let found = captured(&photographs, &options);
-    assert!(mean_iou(&found, &drawn) == 1.0 && found.kept.len() == 12);
+    assert_eq!((found.kept.len(), mean_iou(&found, &drawn)), (12, 1.0), "{:?}", found.selected.dropped);
     let output = folder.path().join("first");
     found.write(&found.report(&Footage::open(&[photographs.clone()]).expect("footage")), &output).expect("written");
     drop(found);

@@ -29,7 +29,7 @@ pub(super) fn select(shots: &Shots, options: &FootageOptions) -> Selected {
     let usual = if is_film {
         of_film
     } else {
-        ChooseOptions { most: shots.shots.len(), min_step_deg: PHOTOGRAPH_STEP_DEG, ..of_film }
+        ChooseOptions { most: (360.0 / PHOTOGRAPH_STEP_DEG) as usize, min_step_deg: PHOTOGRAPH_STEP_DEG, ..of_film }
     };
     let most = (options.most.unwrap_or(usual.most * groups.len()) / groups.len()).max(1);
     // Whoever asks for more than usual means it.
