@@ -307,7 +307,9 @@ fn masks_and_cameras_from_elsewhere_go_by_name() {
     let found = captured(&photographs, &options);
     assert_eq!((found.kept.len(), mean_iou(&found, &drawn)), (12, 1.0), "{:?}", found.selected.dropped);
     let output = folder.path().join("first");
-    found.write(&found.report(&Footage::open(&[photographs.clone()]).expect("footage")), &output).expect("written");
+    found
+        .write(&found.report(&Footage::open(std::slice::from_ref(&photographs)).expect("footage")), &output)
+        .expect("written");
     drop(found);
     // The capture just written gives the cameras of the same photographs, under its own names.
     for (k, name) in (0..12).map(|k| (k, format!("{k:04}.png"))) {

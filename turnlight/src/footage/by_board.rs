@@ -192,10 +192,9 @@ fn print(board: Board, calibration: &Calibration) -> Option<Print> {
     let pair =
         |(index, place): &(usize, Point3<f64>)| Some((*corners.get(*index)?, calibration.world_from_target * place));
     let pairs: Vec<(Point3<f64>, Point3<f64>)> = calibration.points.iter().filter_map(pair).collect();
-    let mean = |of: fn(&(Point3<f64>, Point3<f64>)) -> Point3<f64>| {
-        pairs.iter().map(|pair| of(pair).coords).sum::<Vector3<f64>>() / pairs.len().max(1) as f64
-    };
-    let (on_board, in_world) = (mean(|pair| pair.0), mean(|pair| pair.1));
+    let count = pairs.len().max(1) as f64;
+    let on_board = pairs.iter().map(|pair| pair.0.coords).sum::<Vector3<f64>>() / count;
+    let in_world = pairs.iter().map(|pair| pair.1.coords).sum::<Vector3<f64>>() / count;
     let scatter: Matrix3<f64> =
         pairs.iter().map(|(b, w)| (b.coords - on_board) * (w.coords - in_world).transpose()).sum();
     let svd = scatter.svd(true, true);
