@@ -4,7 +4,7 @@
 //! was at `X` in the first frame is at `c + R(a, θ) (X − c)` in another, for the axis through `c` along `a`, and the
 //! camera `x = R₀ X + t₀` sees it there: `x = R₀ R(a, θ) X + R₀ (c − R(a, θ) c) + t₀`.
 
-use crate::formats::{images_in, natural_order};
+use crate::formats::images_in;
 use crate::{Camera, Capture, CaptureError, Frame, masks, pixels};
 use nalgebra::{Point3, Rotation3, Unit, Vector3};
 use std::path::{Path, PathBuf};
@@ -25,6 +25,8 @@ pub enum TableAngles {
     Step(f64),
     /// By these angles since the camera was calibrated, radians, one per frame in the order of their names.
     List(Vec<f64>),
+    /// By the angle since the camera was calibrated, radians, beside the name of the image, with its extension or without.
+    Named(Vec<(String, f64)>),
 }
 
 /// The camera that sees the object at rest as `camera` sees it turned by `angle` radians.
@@ -38,11 +40,12 @@ pub fn turned_camera(camera: &Camera, axis: &Axis, angle: f64) -> Camera {
     }
 }
 
-/// A capture of the images in `folder` (in the order of their names), with masks under any known spelling.
+/// A capture of the images in `folder` (in the order of their names), with masks under any known spelling. Named angles
+/// of images that are not there are read over. The camera and the axis are taken as they are given.
 ///
 /// # Errors
-/// Names the folder without images, the image whose size is not the camera's, the angles that are too few or too many
-/// or not finite, and an axis or step without meaning.
+/// Names the folder without images, the image whose size is not the camera's, the image without an angle or with two,
+/// the folder whose angles are too few, too many or not finite, and the image without a mask where others have one.
 pub fn turntable_capture(
     folder: &Path,
     camera: &Camera,
@@ -53,7 +56,7 @@ pub fn turntable_capture(
     if images.is_empty() {
         return Err(CaptureError::invalid(folder, "holds no images", "give the folder of the photographs"));
     }
-    let angles = angle_of_each(folder, angles, images.len())?;
+    let angles = angle_of_each(folder, angles, &images)?;
     images.iter().try_for_each(|image| check_size(image, camera))?;
     let frame = |(image_path, angle): (PathBuf, f64)| Frame {
         image_path,
@@ -67,8 +70,8 @@ pub fn turntable_capture(
     Ok(Capture { frames, aabb: None, unit: None, mask_source })
 }
 
-/// Reads angles: a text of lines, the last word of each an angle in degrees; what stands before it (an image name) is
-/// read over, except that lines with names are put into the order of the names. `#` starts a comment.
+/// Reads angles: a text of lines, the last word of each an angle in degrees, after the name of its image or after
+/// nothing. `#` starts a comment.
 ///
 /// # Errors
 /// Names the line that holds no angle, and lines of which only some have names.
@@ -95,23 +98,44 @@ pub fn read_table_angles(file: &Path) -> Result<TableAngles, CaptureError> {
         let fault = format!("{named} of {} lines name an image", lines.len());
         return Err(CaptureError::invalid(file, fault, "name an image in each line, or in none"));
     }
-    lines.sort_by(|a, b| natural_order(&a.0, &b.0));
+    if named > 0 {
+        return Ok(TableAngles::Named(lines));
+    }
     Ok(TableAngles::List(lines.into_iter().map(|(_, angle)| angle).collect()))
 }
 
-fn angle_of_each(folder: &Path, angles: &TableAngles, images: usize) -> Result<Vec<f64>, CaptureError> {
-    let angles = match angles {
-        TableAngles::Step(step) => (0..images).map(|i| step * i as f64).collect(),
+fn angle_of_each(folder: &Path, angles: &TableAngles, images: &[PathBuf]) -> Result<Vec<f64>, CaptureError> {
+    let angles: Vec<f64> = match angles {
+        TableAngles::Step(step) => (0..images.len()).map(|i| step * i as f64).collect(),
         TableAngles::List(list) => list.clone(),
+        TableAngles::Named(named) => images.iter().map(|image| named_angle(image, named)).collect::<Result<_, _>>()?,
     };
-    if angles.len() != images {
-        let fault = format!("holds {images} images, {} angles are given", angles.len());
+    if angles.len() != images.len() {
+        let fault = format!("holds {} images, {} angles are given", images.len(), angles.len());
         return Err(CaptureError::invalid(folder, fault, "give one angle for each image"));
     }
     if angles.iter().any(|angle| !angle.is_finite()) {
         return Err(CaptureError::invalid(folder, "is given an angle that is not finite", "correct it"));
     }
     Ok(angles)
+}
+
+/// The angle beside the image's name: as it is, else without extension, else with another one.
+fn named_angle(image: &Path, named: &[(String, f64)]) -> Result<f64, CaptureError> {
+    let is_whole = |name: &Path| name.file_name() == image.file_name();
+    let is_stem = |name: &Path| name.file_name() == image.file_stem();
+    let has_stem = |name: &Path| name.file_stem() == image.file_stem();
+    let spellings: [&dyn Fn(&Path) -> bool; 3] = [&is_whole, &is_stem, &has_stem];
+    let under = |is_it: &dyn Fn(&Path) -> bool| -> Vec<f64> {
+        named.iter().filter(|(name, _)| is_it(Path::new(name))).map(|(_, angle)| *angle).collect()
+    };
+    let found = spellings.into_iter().map(under).find(|angles| !angles.is_empty()).unwrap_or_default();
+    let fault = match found[..] {
+        [angle] => return Ok(angle),
+        [] => "is given no angle",
+        _ => "is given more than one angle",
+    };
+    Err(CaptureError::invalid(image, fault, "write its name and its angle in one line of the angles"))
 }
 
 fn check_size(image: &Path, camera: &Camera) -> Result<(), CaptureError> {
@@ -195,6 +219,23 @@ mod tests {
     }
 
     #[test]
+    fn named_angles_go_to_the_images_of_their_names() {
+        let folder = folder(3, false);
+        let capture = |names: &[(&str, f64)]| {
+            let named = names.iter().map(|(name, angle)| ((*name).to_owned(), *angle)).collect();
+            turntable_capture(folder.path(), &camera(), &axis(), &TableAngles::Named(named)).map_err(|e| e.to_string())
+        };
+        let names = [("shot_2.png", 0.2), ("elsewhere", 9.0), ("shot_0", 0.0), ("raw/shot_1.tif", 0.1)];
+        let frames = capture(&names).unwrap().frames;
+        let angles = [0.0, 0.1, 0.2].map(|angle| turned_camera(&camera(), &axis(), angle));
+        assert_eq!(frames.iter().map(|f| f.camera).collect::<Vec<_>>(), angles);
+        let fault = capture(&names[..3]).unwrap_err();
+        assert!(fault.contains("shot_1.png: is given no angle"), "{fault}");
+        let fault = capture(&[names, names].concat()).unwrap_err();
+        assert!(fault.contains("shot_0.png: is given more than one angle"), "{fault}");
+    }
+
+    #[test]
     fn angles_are_read_with_and_without_names() {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("angles.txt");
@@ -204,7 +245,8 @@ mod tests {
         };
         let list = |deg: &[f64]| Ok(TableAngles::List(deg.iter().map(|d| d.to_radians()).collect()));
         assert_eq!(read("# turn\n0\n-10.5\n\n20°\n"), list(&[0.0, -10.5, 20.0]));
-        assert_eq!(read("b10.png 3\nb9.png 2\n"), list(&[2.0, 3.0]));
+        let named = [("b 10.png".to_owned(), 3_f64.to_radians()), ("b9".to_owned(), 2_f64.to_radians())];
+        assert_eq!(read("b 10.png 3\nb9\t2\n"), Ok(TableAngles::Named(named.to_vec())));
         assert!(read("0\nx\n").unwrap_err().contains("line 2: 'x' is no angle"));
         assert!(read("0\na.png 1\n").unwrap_err().contains("1 of 2 lines name an image"));
         assert!(read("nan\n").is_err());

@@ -4,7 +4,8 @@
 
 use crate::Error;
 use crate::stages::Stages;
-use capture::{Camera, Capture, Image, Intrinsics, write_matte};
+use capture::footage::read_upright;
+use capture::{Camera, Capture, Image, Intrinsics, read_rgb, write_matte, write_rgb};
 use std::fs;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
@@ -15,9 +16,6 @@ use std::process::{Command, Output};
 pub struct ColmapOptions {
     /// The program, by name or path.
     pub program: PathBuf,
-    /// Whether neighbours in the list are neighbours in space, as in a film that goes around: matches only those, and the
-    /// end with the beginning. Otherwise all pairs, which takes about a second each.
-    pub is_film: bool,
     /// The lens, where it is known; otherwise one focal length and one coefficient of distortion are sought, with the
     /// principal point in the middle. More cannot be told on one ring of cameras.
     pub lens: Option<Intrinsics>,
@@ -28,7 +26,7 @@ pub struct ColmapOptions {
 pub struct Photograph {
     /// The image file.
     pub image: PathBuf,
-    /// Where the object is (from 128 on), of the image's size; everywhere if `None`.
+    /// Where the object is (from 128 on), of the size of the image held upright; everywhere if `None`.
     pub matte: Option<Image<u8>>,
 }
 
@@ -41,14 +39,12 @@ pub struct ColmapCameras {
     pub models: usize,
 }
 
-/// Frames of a film are matched with this many that follow.
-const REACH: usize = 8;
 /// Lines of COLMAP's last words that a fault shows.
 const LAST_WORDS: usize = 3;
 
 impl Default for ColmapOptions {
     fn default() -> Self {
-        Self { program: PathBuf::from("colmap"), is_film: false, lens: None }
+        Self { program: PathBuf::from("colmap"), lens: None }
     }
 }
 
@@ -68,7 +64,7 @@ pub fn find_cameras(
     let place = place.path();
     let names = stage(photographs, place)?;
     stages.run("find features", |_| extract(options, place))?;
-    stages.run("match features", |_| match_features(options, place, &names))?;
+    stages.run("match features", |_| match_features(options, place))?;
     stages.run("find cameras", |_| map(options, place))?;
     largest_model(&place.join("sparse"), &names)
 }
@@ -81,12 +77,7 @@ fn stage(photographs: &[Photograph], place: &Path) -> Result<Vec<String>, Error>
     }
     let mut names = Vec::with_capacity(photographs.len());
     for (i, photograph) in photographs.iter().enumerate() {
-        let extension = photograph.image.extension().and_then(|e| e.to_str()).unwrap_or("png");
-        let name = format!("{i:06}.{extension}");
-        let to = images.join(&name);
-        // A link costs nothing; across disks it must be a copy.
-        let laid = fs::hard_link(&photograph.image, &to).or_else(|_| fs::copy(&photograph.image, &to).map(|_| ()));
-        laid.map_err(|fault| cannot(&photograph.image, &fault))?;
+        let name = lay(&photograph.image, &images, i)?;
         if let Some(matte) = &photograph.matte {
             // COLMAP takes whatever is not zero.
             let mask = matte.map(|v| if v >= 128 { 255 } else { 0 });
@@ -95,6 +86,26 @@ fn stage(photographs: &[Photograph], place: &Path) -> Result<Vec<String>, Error>
         names.push(name);
     }
     Ok(names)
+}
+
+/// Lays one photograph out upright, as its matte is; its name there. What EXIF says of the orientation is done here, so that
+/// COLMAP need not heed it; files that are upright stay as they are, with what EXIF says of the focal length.
+fn lay(image: &Path, folder: &Path, position: usize) -> Result<String, Error> {
+    let upright = read_upright(image)?;
+    if read_rgb(image)? != upright {
+        let name = format!("{position:06}.png");
+        write_rgb(&folder.join(&name), &upright)?;
+        return Ok(name);
+    }
+    let extension = image.extension().and_then(|e| e.to_str()).unwrap_or("png");
+    let name = format!("{position:06}.{extension}");
+    let to = folder.join(&name);
+    // The file itself: a link to a relative symbolic link leads nowhere.
+    let from = fs::canonicalize(image).map_err(|fault| cannot(image, &fault))?;
+    // A link costs nothing; across disks it must be a copy.
+    let laid = fs::hard_link(&from, &to).or_else(|_| fs::copy(&from, &to).map(|_| ()));
+    laid.map_err(|fault| cannot(image, &fault))?;
+    Ok(name)
 }
 
 fn extract(options: &ColmapOptions, place: &Path) -> Result<(), Error> {
@@ -122,26 +133,13 @@ fn parameters(lens: &Intrinsics) -> String {
     all.map(|v| v.to_string()).join(",")
 }
 
-fn match_features(options: &ColmapOptions, place: &Path, names: &[String]) -> Result<(), Error> {
-    let [database, pairs] = ["database.db", "pairs.txt"].map(|name| text(&place.join(name)));
-    let command = if options.is_film { "matches_importer" } else { "exhaustive_matcher" };
-    let known = run(options, command, &["-h"])?;
+/// Matches all pairs, which takes about a second each.
+fn match_features(options: &ColmapOptions, place: &Path) -> Result<(), Error> {
+    let database = text(&place.join("database.db"));
+    let known = run(options, "exhaustive_matcher", &["-h"])?;
     let mut arguments = vec!["--database_path", &database];
-    if options.is_film {
-        fs::write(&pairs, neighbours(names)).map_err(|fault| cannot(Path::new(&pairs), &fault))?;
-        arguments.extend(["--match_list_path", &pairs, "--match_type", "pairs"]);
-    }
     arguments.extend(first_known(&known, &["--FeatureMatching.use_gpu", "--SiftMatching.use_gpu"], "0"));
-    run(options, command, &arguments).map(|_| ())
-}
-
-/// Each name with those that follow, around the end, one pair a line.
-fn neighbours(names: &[String]) -> String {
-    let n = names.len();
-    // Where all are neighbours, each pair once.
-    let is_new = |i: usize, ahead: usize| 2 * ahead < n || (2 * ahead == n && i < ahead);
-    let pairs = (0..n).flat_map(|i| (1..=REACH).filter(move |&ahead| is_new(i, ahead)).map(move |ahead| (i, ahead)));
-    pairs.map(|(i, ahead)| format!("{} {}\n", names[i], names[(i + ahead) % n])).collect()
+    run(options, "exhaustive_matcher", &arguments).map(|_| ())
 }
 
 fn map(options: &ColmapOptions, place: &Path) -> Result<(), Error> {
@@ -252,7 +250,7 @@ mod tests {
     fn photographs(folder: &Path, count: usize) -> Vec<Photograph> {
         let photograph = |i| {
             let image = folder.join(format!("shot {i}.png"));
-            capture::write_rgb(&image, &Image::filled(8, 6, [5; 3])).unwrap();
+            write_rgb(&image, &Image::filled(8, 6, [5; 3])).unwrap();
             Photograph { image, matte: Some(Image::filled(8, 6, 200)) }
         };
         (0..count).map(photograph).collect()
@@ -283,14 +281,6 @@ mod tests {
     }
 
     #[test]
-    fn films_are_matched_with_their_neighbours_and_around_the_end() {
-        let names = |n: usize| (0..n).map(|i| i.to_string()).collect::<Vec<_>>();
-        let pairs = |n| neighbours(&names(n)).lines().count();
-        assert_eq!([0, 1, 2, 3, 4, 5, 16, 72].map(pairs), [0, 0, 1, 3, 6, 10, 120, 576]);
-        assert!(neighbours(&names(72)).contains("71 7\n"));
-    }
-
-    #[test]
     fn a_known_lens_is_given_and_left_alone() {
         let folder = tempfile::tempdir().unwrap();
         let distortion = Distortion { k1: -0.06, k3: 0.001, ..Distortion::default() };
@@ -301,6 +291,25 @@ mod tests {
         let log = fs::read_to_string(folder.path().join("log")).unwrap();
         assert!(log.contains("FULL_OPENCV --ImageReader.camera_params 9.5,9,4,3,-0.06,0,0,0,0.001,0,0,0"), "{log}");
         assert!(log.contains("--Mapper.ba_refine_focal_length 0"), "{log}");
+    }
+
+    #[test]
+    fn photographs_are_laid_out_upright_and_symbolic_links_followed() {
+        let folder = tempfile::tempdir().unwrap();
+        let place = |name: &str| folder.path().join(name);
+        write_rgb(&place("shot.png"), &Image::filled(8, 6, [5; 3])).unwrap();
+        std::os::unix::fs::symlink("shot.png", place("link.png")).unwrap();
+        // An eXIf chunk after the header (8 + 25 bytes), with one entry: orientation (0x0112) 6, a quarter turn.
+        let mut bytes = fs::read(place("shot.png")).unwrap();
+        let exif = *b"\0\0\0\x1aeXIfMM\0\x2a\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0\x06\0\0\0\0\0\0\xd6gKi";
+        bytes.splice(33..33, exif);
+        fs::write(place("held.png"), bytes).unwrap();
+        let shots = ["link.png", "held.png"].map(|name| Photograph { image: place(name), matte: None });
+        assert_eq!(stage(&shots, folder.path()).unwrap(), ["000000.png", "000001.png"]);
+        let laid = |name: &str| place("images").join(name);
+        assert!(fs::symlink_metadata(laid("000000.png")).unwrap().is_file());
+        let held = read_rgb(&laid("000001.png")).unwrap();
+        assert_eq!([held.width(), held.height()], [6, 8]);
     }
 
     #[test]
