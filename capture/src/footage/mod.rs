@@ -67,7 +67,7 @@ impl Footage {
     /// Lists what there is at `paths`, each a film, a photograph, or a folder of photographs. Nothing is decoded yet.
     ///
     /// # Errors
-    /// Names the path that is missing, or the folder that has neither photographs nor films, or more than one film.
+    /// Names the path that is missing, or the folder that has neither photographs nor films, both, or more than one film.
     pub fn open(paths: &[PathBuf]) -> Result<Self, CaptureError> {
         let mut takes = Vec::new();
         for (i, path) in paths.iter().enumerate() {

@@ -21,8 +21,11 @@ const LARGEST_CAMOUFLAGE: f64 = 0.25;
 /// Of the cloth's (encoded) light, what the object may have where it is of the same colour.
 const SHADES: std::ops::RangeInclusive<f32> = 0.35..=1.3;
 
-/// Cells kept around the hull.
+/// Cells kept around the hull where it is looked for again: thumbnails lose thin tips, a trunk or a tusk.
 const MARGIN_CELLS: f64 = 8.0;
+
+/// Cells around the hull in the box that is told.
+const BOX_CELLS: f64 = 3.0;
 
 /// Judges silhouettes from elsewhere.
 ///
@@ -135,7 +138,7 @@ pub(super) fn summed_up(found: Found, gains: Vec<[f64; 3]>, setup: &StageSetup, 
         agreement: found.agreement,
         contradicting,
         gains,
-        aabb: found.belief.map(|b| b.bounds),
+        aabb: found.belief.and_then(|b| Some(b.within(&b.hull.as_ref()?.tight_box(BOX_CELLS)?))),
         evidence,
         findings,
     }
