@@ -41,6 +41,8 @@ pub(super) struct Round {
     is_guess: bool,
     /// Log odds that a pixel of distance outside the hull costs: little as long as too much may be carved.
     distrust: f32,
+    /// Whether the hull has seen through every hole by now: what it does not see through is a patch.
+    fills_holes: bool,
     /// Pixels around the hull that may be object as well.
     hidden_px: f64,
     /// Whether coverage at the edge is asked for.
@@ -53,17 +55,45 @@ const fn up_to(share: f64) -> Dissent {
 }
 
 /// On thumbnails, first without and then with a rough hull: clutter and holes are many.
-pub(super) const GUESS: Round =
-    Round { resolution: 80, dissent: up_to(0.2), is_guess: true, distrust: 0.0, hidden_px: 2.0, is_refined: false };
+pub(super) const GUESS: Round = Round {
+    resolution: 80,
+    dissent: up_to(0.2),
+    is_guess: true,
+    distrust: 0.0,
+    fills_holes: false,
+    hidden_px: 2.0,
+    is_refined: false,
+};
 /// On thumbnails, with a hull.
-pub(super) const COARSE: Round =
-    Round { resolution: 96, dissent: up_to(0.12), is_guess: false, distrust: 0.5, hidden_px: 2.5, is_refined: false };
+pub(super) const COARSE: Round = Round {
+    resolution: 96,
+    dissent: up_to(0.12),
+    is_guess: false,
+    distrust: 0.5,
+    fills_holes: false,
+    hidden_px: 2.5,
+    is_refined: false,
+};
 /// At full size.
-pub(super) const FINE: Round =
-    Round { resolution: 128, dissent: up_to(0.08), is_guess: false, distrust: 0.5, hidden_px: 2.5, is_refined: true };
+pub(super) const FINE: Round = Round {
+    resolution: 128,
+    dissent: up_to(0.08),
+    is_guess: false,
+    distrust: 0.5,
+    fills_holes: false,
+    hidden_px: 2.5,
+    is_refined: true,
+};
 /// At full size, for good.
-pub(super) const LAST: Round =
-    Round { resolution: 160, dissent: up_to(0.04), is_guess: false, distrust: 2.0, hidden_px: 2.5, is_refined: true };
+pub(super) const LAST: Round = Round {
+    resolution: 160,
+    dissent: up_to(0.04),
+    is_guess: false,
+    distrust: 2.0,
+    fills_holes: true,
+    hidden_px: 2.5,
+    is_refined: true,
+};
 
 /// What is known of the object.
 #[derive(Clone, Debug)]
@@ -212,7 +242,7 @@ impl Scene<'_> {
             let colours = colours(&picture, &odds.log_odds, &matte);
             return Part { cutout, camera, matte, unseparated: 0.0, colours };
         };
-        let mask = decision::decided(&odds, &hull, round.distrust);
+        let mask = decision::decided(&odds, &hull, round.distrust, round.fills_holes);
         let matte = if round.is_refined { rim::refined(&picture, &odds.background, &mask) } else { mask };
         let colours = colours(&picture, &odds.log_odds, &matte);
         Part { cutout, camera, matte, unseparated: unseparated(&odds.log_odds, &hull), colours }
