@@ -16,7 +16,7 @@ pub(crate) mod turntable;
 
 use crate::arguments::{CaptureArgs, FitArgs, MeshArgs, MethodArg, ShapeArgs};
 use std::path::Path;
-use turnlight::capture::{Capture, LoadOptions, View};
+use turnlight::capture::{Capture, LoadOptions, MaskSource, View};
 use turnlight::pipeline::ShapeOptions;
 use turnlight::stages::Stages;
 use turnlight::texture::{FitOptions, Method};
@@ -78,6 +78,16 @@ impl CaptureArgs {
 fn read_capture(path: &Path, ignore_masks: bool) -> Result<Capture, Error> {
     let capture = Capture::read(path)?;
     Ok(if ignore_masks { capture.without_masks() } else { capture })
+}
+
+/// Writes a capture; silhouettes that no mask gives are found once and kept, so that they can be looked at and mended.
+fn write_capture(capture: &Capture, output: &Path, stages: &mut Stages<'_>) -> Result<(), Error> {
+    if capture.mask_source != MaskSource::Automatic {
+        return Ok(stages.run("write", |_| capture.write(output))?);
+    }
+    let views = stages.run("find silhouettes", |_| capture.load_all_views(&LoadOptions::default()))?;
+    let mattes: Vec<_> = views.into_iter().map(|view| view.matte).collect();
+    Ok(stages.run("write", |_| capture.write_with_mattes(&mattes, output))?)
 }
 
 fn read_file(path: &Path) -> Result<Vec<u8>, Error> {

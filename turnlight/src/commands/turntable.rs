@@ -1,12 +1,13 @@
 //! `turnlight turntable`
 
+use super::write_capture;
 use crate::Answer;
 use crate::arguments::TurntableArgs;
 use nalgebra::{Point3, Unit, Vector3};
 use serde_json::json;
 use turnlight::Error;
+use turnlight::capture::Capture;
 use turnlight::capture::turntable::{Axis, TableAngles, read_table_angles, turntable_capture};
-use turnlight::capture::{Capture, LoadOptions, MaskSource};
 use turnlight::stages::{Observer, Stages};
 
 pub(crate) fn run(args: &TurntableArgs, observer: &dyn Observer) -> Result<Answer, Error> {
@@ -27,14 +28,7 @@ pub(crate) fn run(args: &TurntableArgs, observer: &dyn Observer) -> Result<Answe
     let mut capture = turntable_capture(&args.photographs, &camera.camera, &axis, &angles)?;
     capture.aabb = calibrated.aabb;
     capture.unit = calibrated.unit;
-    if capture.mask_source == MaskSource::Automatic {
-        // Found once and kept, so that they can be looked at and mended.
-        let views = stages.run("find silhouettes", |_| capture.load_all_views(&LoadOptions::default()))?;
-        let mattes: Vec<_> = views.into_iter().map(|view| view.matte).collect();
-        stages.run("write", |_| capture.write_with_mattes(&mattes, &args.output))?;
-    } else {
-        stages.run("write", |_| capture.write(&args.output))?;
-    }
+    write_capture(&capture, &args.output, &mut stages)?;
     let views = capture.frames.len();
     let text = format!("{views} views around the axis; {}\nwrote {}", capture.mask_source, args.output.display());
     let json = json!({
