@@ -1,0 +1,204 @@
+//! Bidirectional texture functions (BTFs) as measured: how a flat sample looks from many directions under
+//! light from many directions.
+//!
+//! A [`Btf`] is a full grid: one picture per pair of view and light. What a measurement lacks is filled
+//! when it is read, from the light nearest to it, and marked ([`Btf::is_measured`]); what is not a
+//! number is filled likewise. So no codec ever meets a hole, and no evaluation counts one.
+//!
+//! - Directions are unit vectors from the surface: x right, y up, z along the normal, towards light and eye.
+//! - Row 0 of a picture is at the largest y. The tile is taken to continue itself on all sides.
+//! - Samples are laid out (view, light, y, x, channel), RGB, encoded as [`Encoding`] says.
+
+mod directions;
+mod folder;
+
+pub use directions::{BtfDirection, DIRECTIONS, bonn_directions};
+pub use folder::read_folder;
+
+use crate::CaptureError;
+use nalgebra::Vector3;
+use rayon::prelude::*;
+
+/// How a sample stands for radiance `L · exposure`.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Encoding {
+    /// sRGB, nominally 0 to 1: measured in 8 bits.
+    Srgb,
+    /// The radiance itself, not bounded above: measured in 12 bits or more.
+    Linear,
+    /// `ln(1 + L/floor) / ln(1 + peak/floor)`, nominally 0 to 1: how radiance of a high range is coded.
+    Log {
+        /// Radiance below which steps are even.
+        floor: f32,
+        /// Radiance that becomes 1.
+        peak: f32,
+    },
+}
+
+/// A bidirectional texture function in memory.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Btf {
+    /// What was measured.
+    pub name: String,
+    /// Unit vectors towards the eye.
+    pub views: Vec<Vector3<f64>>,
+    /// Unit vectors towards the light.
+    pub lights: Vec<Vector3<f64>>,
+    /// Texels across.
+    pub width: usize,
+    /// Texels down.
+    pub height: usize,
+    /// How samples stand for radiance.
+    pub encoding: Encoding,
+    /// What radiance was multiplied by before it was encoded.
+    pub exposure: f32,
+    /// Whether the cosine of the light is in the samples.
+    pub includes_cosine: bool,
+    /// Between texels, where known.
+    pub texel_pitch_mm: Option<f64>,
+    /// Laid out (view, light, y, x, channel).
+    pub samples: Vec<f32>,
+    /// Per pair, (view, light): false where the picture was filled in. Empty where all were measured.
+    pub measured: Vec<bool>,
+}
+
+impl Encoding {
+    /// Radiance times exposure of a sample. Negative samples, which codecs may answer with, are 0.
+    pub fn decode(self, sample: f32) -> f32 {
+        let sample = sample.max(0.0);
+        match self {
+            Self::Srgb if sample <= 0.040_45 => sample / 12.92,
+            Self::Srgb => ((sample + 0.055) / 1.055).powf(2.4),
+            Self::Linear => sample,
+            Self::Log { floor, peak } => floor * (sample * (peak / floor).ln_1p()).exp_m1(),
+        }
+    }
+
+    /// The sample of a radiance times exposure, not clamped above.
+    pub fn encode(self, radiance: f32) -> f32 {
+        let radiance = radiance.max(0.0);
+        match self {
+            Self::Srgb if radiance <= 0.003_130_8 => radiance * 12.92,
+            Self::Srgb => 1.055 * radiance.powf(1.0 / 2.4) - 0.055,
+            Self::Linear => radiance,
+            Self::Log { floor, peak } => (radiance / floor).ln_1p() / (peak / floor).ln_1p(),
+        }
+    }
+
+    /// Bits of one sample as measured: what a compression ratio is counted against.
+    pub fn raw_bits(self) -> u32 {
+        match self {
+            Self::Srgb => 8,
+            Self::Linear | Self::Log { .. } => 12,
+        }
+    }
+}
+
+impl Btf {
+    /// Texels of the tile.
+    pub fn texels(&self) -> usize {
+        self.width * self.height
+    }
+
+    /// Pairs of view and light.
+    pub fn pairs(&self) -> usize {
+        self.views.len() * self.lights.len()
+    }
+
+    /// One picture, (y, x, channel).
+    ///
+    /// # Panics
+    /// Where view or light is out of range.
+    pub fn picture(&self, view: usize, light: usize) -> &[f32] {
+        let length = 3 * self.texels();
+        &self.samples[(view * self.lights.len() + light) * length..][..length]
+    }
+
+    /// One texel (`y · width + x`) under all pairs: (view, light, channel).
+    pub fn apparent_brdf(&self, texel: usize) -> Vec<f32> {
+        self.samples.chunks_exact(3 * self.texels()).flat_map(|p| p[3 * texel..3 * texel + 3].iter().copied()).collect()
+    }
+
+    /// Whether a picture was measured, not filled in.
+    pub fn is_measured(&self, view: usize, light: usize) -> bool {
+        self.measured.get(view * self.lights.len() + light).copied().unwrap_or(true)
+    }
+
+    /// Bytes of the samples as measured: 8 bits each, 12 for a high range.
+    pub fn raw_bytes(&self) -> u64 {
+        3 * self.texels() as u64 * self.pairs() as u64 * u64::from(self.encoding.raw_bits()) / 8
+    }
+
+    /// The same samples, encoded otherwise.
+    #[must_use]
+    pub fn encoded(mut self, encoding: Encoding) -> Self {
+        let from = self.encoding;
+        if from != encoding {
+            self.samples.par_iter_mut().for_each(|s| *s = encoding.encode(from.decode(*s)));
+            self.encoding = encoding;
+        }
+        self
+    }
+
+    /// Checks that the numbers fit one another, and fills what is not finite from the nearest light under
+    /// which the texel is, or by 0 where there is none. Tells how many samples were filled.
+    ///
+    /// # Errors
+    /// Where lists are empty, lengths disagree or a direction is not a unit vector.
+    pub fn check(&mut self) -> Result<usize, CaptureError> {
+        let fault = |fault: String| {
+            Err(CaptureError::Stage {
+                fault,
+                remedy: "give one picture of equal size per pair of view and light".into(),
+            })
+        };
+        let expected = self.pairs() * 3 * self.texels();
+        if expected == 0 || self.samples.len() != expected {
+            return fault(format!(
+                "a BTF of {} views, {} lights and {} × {} texels needs {expected} samples, {} are there",
+                self.views.len(),
+                self.lights.len(),
+                self.width,
+                self.height,
+                self.samples.len()
+            ));
+        }
+        if !self.measured.is_empty() && self.measured.len() != self.pairs() {
+            return fault(format!("{} pairs are marked as measured or not, of {}", self.measured.len(), self.pairs()));
+        }
+        let bent = |d: &Vector3<f64>| !((d.norm() - 1.0).abs() < 1e-3 && d.z > -1e-6);
+        if let Some(d) = self.views.iter().chain(&self.lights).find(|d| bent(d)) {
+            return fault(format!("({}, {}, {}) is no unit vector above the surface", d.x, d.y, d.z));
+        }
+        Ok(self.fill())
+    }
+
+    fn fill(&mut self) -> usize {
+        let (lights, length) = (self.lights.len(), 3 * self.width * self.height);
+        let order: Vec<Vec<usize>> = self.lights.iter().map(|l| nearest_first(l, &self.lights)).collect();
+        let fill_view = |view: &mut [f32]| {
+            let holes: Vec<usize> = (0..view.len()).filter(|&i| !view[i].is_finite()).collect();
+            let known: Vec<f32> = holes.iter().map(|&i| nearest_known(view, i, length, &order)).collect();
+            holes.iter().zip(&known).for_each(|(&i, &value)| view[i] = value);
+            holes.len()
+        };
+        self.samples.par_chunks_mut(lights * length).map(fill_view).sum()
+    }
+}
+
+/// Positions in `all`, the nearest direction to `from` first.
+fn nearest_first(from: &Vector3<f64>, all: &[Vector3<f64>]) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..all.len()).collect();
+    order.sort_by(|&a, &b| from.dot(&all[b]).total_cmp(&from.dot(&all[a])).then(a.cmp(&b)));
+    order
+}
+
+/// The value of a sample of one view under the nearest light that has one.
+fn nearest_known(view: &[f32], sample: usize, length: usize, order: &[Vec<usize>]) -> f32 {
+    let (light, place) = (sample / length, sample % length);
+    order[light].iter().map(|l| view[l * length + place]).find(|v| v.is_finite()).unwrap_or(0.0)
+}
+
+#[cfg(test)]
+mod tests;
