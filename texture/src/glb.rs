@@ -9,6 +9,7 @@ use crate::appearance::{Lumigraph, static_texture::base_layer};
 use crate::coding;
 use crate::directions::{DirectionComplex, Layout};
 use crate::layers::{FacetWeights, Layer, Layers};
+use crate::material_layer::{self, MaterialLayer, charts_of_file};
 use crate::model::{Appearance, FitOptions, Method, Model};
 use crate::surface::{self, SurfaceTexels};
 use capture::Image;
@@ -64,6 +65,16 @@ struct Extension {
     ring_axis: Option<[f64; 3]>,
     #[serde(skip_serializing_if = "Option::is_none")]
     camera_centers: Option<usize>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    materials: Vec<MaterialEntry>,
+}
+
+#[derive(Debug, Serialize, Deserialize)]
+#[serde(rename_all = "camelCase")]
+struct MaterialEntry {
+    charts: Vec<u32>,
+    tile_size: f64,
+    buffer_view: usize,
 }
 
 #[derive(Debug, Serialize, Deserialize)]
@@ -144,11 +155,12 @@ fn assemble(model: &Model) -> Result<(Vec<u8>, u64), TextureError> {
     };
     let mut w = Writer::default();
     let primitive = write_mesh(&mut w, &model.mesh);
-    let (extension, preview) = match &model.appearance {
+    let (mut extension, preview) = match &model.appearance {
         Appearance::Layers(layers) => write_layers(&mut w, model, layers),
         Appearance::Lumigraph(rays, surface) => write_lumigraph(&mut w, model, rays, surface),
     }
     .ok_or_else(|| refused("a part of the model is empty or too large to be coded"))?;
+    extension.materials = write_materials(&mut w, model)?;
     let extension = serde_json::to_value(extension).map_err(|e| refused(&e.to_string()))?;
     let root = root(&w, primitive, extension, preview);
     let json = serde_json::to_vec(&root).map_err(|e| refused(&e.to_string()))?;
@@ -215,6 +227,7 @@ fn blank(model: &Model) -> Extension {
         rays: Vec::new(),
         ring_axis: None,
         camera_centers: None,
+        materials: Vec::new(),
     }
 }
 
@@ -230,13 +243,52 @@ fn write_layers(w: &mut Writer, model: &Model, layers: &Layers) -> Option<(Exten
     e.ring_axis = layers.facets.iter().find_map(|f| f.complex.ring()).map(Into::into);
     write_facets(w, &mut e, &layers.facets)?;
     let preview = match model.method {
-        Method::Vdtm => w.image(&mean_of_layers(layers)?, "preview".to_owned()),
-        _ => e.layers.first()?.image,
+        Method::Vdtm => write_preview(w, model, mean_of_layers(layers))?,
+        _ if model.materials.is_empty() => e.layers.first()?.image,
+        _ => write_preview(w, model, first_layer(layers)?)?,
     };
     Some((e, preview))
 }
 
-fn mean_of_layers(layers: &Layers) -> Option<Vec<u8>> {
+/// What plain viewers show, under the materials.
+fn write_preview(w: &mut Writer, model: &Model, mut mean: Image<[f32; 3]>) -> Option<usize> {
+    material_layer::paint(&mut mean, &as_stored(&model.mesh), &model.materials);
+    Some(w.image(&base_layer(&mean, &FitOptions::default())?.coded, "preview".to_owned()))
+}
+
+/// The mesh as it will be read: so that a model that was read is written as it was.
+fn as_stored(mesh: &TexturedMesh) -> TexturedMesh {
+    let mut stored = mesh.clone();
+    let round = |v: &mut f64| *v = f64::from(*v as f32);
+    stored.mesh.positions.iter_mut().for_each(|p| p.iter_mut().for_each(round));
+    stored.uvs.iter_mut().for_each(|p| p.iter_mut().for_each(round));
+    stored
+}
+
+/// Materials lie on the charts as the reader will number them.
+fn write_materials(w: &mut Writer, model: &Model) -> Result<Vec<MaterialEntry>, TextureError> {
+    material_layer::check(&model.materials, &model.mesh.face_charts).map_err(material_layer::refused)?;
+    if model.materials.is_empty() {
+        return Ok(Vec::new());
+    }
+    let stored = charts_of_file(&model.mesh.mesh.faces, model.mesh.mesh.positions.len());
+    let write = |layer: &MaterialLayer| {
+        let faces = stored.iter().zip(&model.mesh.face_charts);
+        let mut charts: Vec<u32> =
+            faces.filter(|(_, chart)| layer.charts.binary_search(chart).is_ok()).map(|(&stored, _)| stored).collect();
+        charts.sort_unstable();
+        charts.dedup();
+        MaterialEntry { charts, tile_size: layer.tile_size, buffer_view: w.view(&layer.coded) }
+    };
+    Ok(model.materials.iter().map(write).collect())
+}
+
+fn first_layer(layers: &Layers) -> Option<Image<[f32; 3]>> {
+    let layer = layers.layers.first()?;
+    Some(layer.texels.map(|texel| texel.map(|t| layer.offset + layer.scale * f32::from(t))))
+}
+
+fn mean_of_layers(layers: &Layers) -> Image<[f32; 3]> {
     let size = (layers.facet_of_texel.width(), layers.facet_of_texel.height());
     let mut mean = Image::filled(size.0, size.1, [0.0f32; 3]);
     let share = 1.0 / layers.layers.len().max(1) as f32;
@@ -245,7 +297,7 @@ fn mean_of_layers(layers: &Layers) -> Option<Vec<u8>> {
             m.iter_mut().zip(t).for_each(|(m, &t)| *m += share * f32::from(t));
         }
     }
-    Some(base_layer(&mean, &FitOptions::default())?.coded)
+    mean
 }
 
 fn write_facets(w: &mut Writer, e: &mut Extension, facets: &[FacetWeights]) -> Option<()> {
@@ -332,8 +384,7 @@ fn write_lumigraph(
     let centers: Vec<u8> =
         rays.centers.iter().flat_map(|c| [c.x, c.y, c.z]).flat_map(|v| (v as f32).to_le_bytes()).collect();
     e.camera_centers = w.part(&centers, FLOAT, "VEC3", rays.centers.len());
-    let preview = base_layer(&rays.mean(surface), &FitOptions::default())?;
-    let preview = w.image(&preview.coded, "preview".to_owned());
+    let preview = write_preview(w, model, rays.mean(surface))?;
     Some((e, preview))
 }
 
@@ -380,14 +431,19 @@ impl<'a> Reader<'a> {
         Ok((&bytes[..length], count))
     }
 
-    /// Refuses layers that decode the same bytes again and again: a small file could ask for any memory.
-    fn refuse_shared_images(&self, e: &Extension) -> Result<(), String> {
+    /// Refuses layers and materials that decode the same bytes again and again: a small file could ask for any memory.
+    fn refuse_shared_bytes(&self, e: &Extension) -> Result<(), String> {
         let rays = e.rays.iter().flat_map(|ray| [ray.color, ray.view]);
         let mut bytes = 0usize;
         for image in e.layers.iter().map(|layer| layer.image).chain(rays) {
             bytes = bytes.saturating_add(self.image(image)?.len());
         }
-        if bytes > self.bin.len() { Err("its layers share images".to_owned()) } else { Ok(()) }
+        if bytes > self.bin.len() {
+            return Err("its layers share images".to_owned());
+        }
+        let materials = e.materials.iter().map(|entry| Ok(self.view(entry.buffer_view)?.len()));
+        let bytes = materials.sum::<Result<usize, String>>()?;
+        if bytes > self.bin.len() { Err("its materials share bytes".to_owned()) } else { Ok(()) }
     }
 
     fn floats(&self, index: usize, kind: &str, per: usize) -> Result<Vec<f64>, String> {
@@ -441,12 +497,23 @@ pub(crate) fn read(bytes: &[u8]) -> Result<Model, String> {
     if !surface::is_atlas_size(e.atlas_size) {
         return Err(format!("an atlas of {:?} texels", e.atlas_size));
     }
-    reader.refuse_shared_images(&e)?;
+    reader.refuse_shared_bytes(&e)?;
     let method: Method = e.method.parse()?;
     let mesh = read_mesh(&reader, e.atlas_size)?;
     let appearance =
         if method == Method::Lumigraph { read_lumigraph(&reader, &e, &mesh)? } else { read_layers(&reader, &e)? };
-    Ok(Model { mesh, method, appearance })
+    let materials = read_materials(&reader, &e, &mesh)?;
+    Ok(Model { mesh, method, appearance, materials })
+}
+
+fn read_materials(r: &Reader<'_>, e: &Extension, mesh: &TexturedMesh) -> Result<Vec<MaterialLayer>, String> {
+    let read = |(k, entry): (usize, &MaterialEntry)| {
+        let layer = MaterialLayer::new(entry.charts.clone(), entry.tile_size, r.view(entry.buffer_view)?.to_vec());
+        layer.map_err(|fault| format!("material {k}: {fault}"))
+    };
+    let layers = e.materials.iter().enumerate().map(read).collect::<Result<Vec<_>, _>>()?;
+    material_layer::check(&layers, &mesh.face_charts)?;
+    Ok(layers)
 }
 
 fn read_mesh(r: &Reader<'_>, atlas_size: [usize; 2]) -> Result<TexturedMesh, String> {
@@ -470,39 +537,8 @@ fn read_mesh(r: &Reader<'_>, atlas_size: [usize; 2]) -> Result<TexturedMesh, Str
     }
     let faces = indices.as_chunks::<3>().0.to_vec();
     let mesh = Mesh { positions, faces };
-    let face_charts = connected_charts(&mesh);
+    let face_charts = charts_of_file(&mesh.faces, mesh.positions.len());
     Ok(TexturedMesh { mesh, uvs, face_charts, atlas_size })
-}
-
-/// Charts are the parts that share no vertex; numbered by their first face.
-fn connected_charts(mesh: &Mesh) -> Vec<u32> {
-    let mut parent: Vec<u32> = (0..mesh.positions.len() as u32).collect();
-    fn find(parent: &mut [u32], mut v: u32) -> u32 {
-        while parent[v as usize] != v {
-            parent[v as usize] = parent[parent[v as usize] as usize];
-            v = parent[v as usize];
-        }
-        v
-    }
-    for &[a, b, c] in &mesh.faces {
-        for other in [b, c] {
-            let (x, y) = (find(&mut parent, a), find(&mut parent, other));
-            parent[x.max(y) as usize] = x.min(y);
-        }
-    }
-    let mut number = vec![u32::MAX; mesh.positions.len()];
-    let mut next = 0;
-    mesh.faces
-        .iter()
-        .map(|f| {
-            let root = find(&mut parent, f[0]) as usize;
-            if number[root] == u32::MAX {
-                number[root] = next;
-                next += 1;
-            }
-            number[root]
-        })
-        .collect()
 }
 
 fn read_layers(r: &Reader<'_>, e: &Extension) -> Result<Appearance, String> {
