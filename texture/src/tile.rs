@@ -160,7 +160,8 @@ mod tests {
     fn the_tile_continues_itself() {
         for (side, k) in [(1.0, 3.0), (2.4, -2.0), (9.0, 5.0), (100.0, 1.0)] {
             // A tile of 32: cells of 2ⁿ continue as well.
-            let (here, there) = (weights(1.3, 30.9, side, [32, 32]), weights(1.3 + 32.0 * k, 30.9 - 32.0, side, [32, 32]));
+            let (here, there) =
+                (weights(1.3, 30.9, side, [32, 32]), weights(1.3 + 32.0 * k, 30.9 - 32.0, side, [32, 32]));
             assert!(here.iter().zip(&there).all(|(a, b)| (a - b).abs() < 1e-5), "{side}");
         }
         let edge = weights(0.0, 0.5, 1.0, [8, 1]);

@@ -12,9 +12,9 @@
 //!   White matt paint facing a light of `E = π` is white at 0 stops.
 //! - `l`, `v` are the directions to light and eye in the [`frame`](mod@frame) of the point. A light below the surface gives nothing;
 //!   an eye below it, which only the interpolated normal of a coarse mesh can do, looks along it.
-//! - Codecs hold what lies beyond the outermost lights measured as it is there. If the cosine is in the samples it goes
-//!   on falling: samples are scaled by `l_z / z`, with `z` that of the lowest light measured, so that
-//!   nothing breaks off where the light sets.
+//! - Directions lower than the lowest measured are raised to it, `z`, for no codec knows what lies beyond. If the cosine
+//!   is in the samples it goes on falling: they are scaled by `l_z / z`, so that nothing breaks off where the
+//!   light sets.
 //! - `texels, w`: [`texture::tile`]; one repetition measures [`Coat::tile_size`] world units, whatever the chart's density.
 //! - Both sides of a face carry the material, its outside turned to the eye.
 //!
@@ -31,10 +31,11 @@ pub use synthesized::Synthesized;
 
 use crate::face::{Corners, corners};
 use capture::btf::Encoding;
-use frame::{Frames, TangentFrame};
+use frame::Frames;
 use geometry::TexturedMesh;
 use nalgebra::{Point2, Point3, Vector3};
-use texture::btf::{Material, Sampler};
+use std::collections::BTreeMap;
+use texture::btf::{DirectionSet, Material, Sampler};
 use texture::tile::{is_mirrored, texel_sizes, texels_under};
 
 /// A material and where it lies.
@@ -95,8 +96,10 @@ struct CoatedFace {
 struct Prepared<'a> {
     coat: Coat<'a>,
     size: [usize; 2],
-    /// Height of the lowest light measured, above 0.
+    /// z of the lowest light measured, above 0.
     lowest_light: f64,
+    /// z of the lowest view measured.
+    lowest_view: f64,
 }
 
 impl<'a> Coat<'a> {
@@ -114,13 +117,14 @@ impl<'a> Coat<'a> {
 }
 
 impl<'a> Coats<'a> {
-    /// Lays `coats` over `mesh`; of two on one chart the first shows. Charts without area, and coats whose tile or
-    /// exposure is not positive, are black.
+    /// Lays `coats` over `mesh`; of two on one chart the last shows. A chart without area and a tile without size show
+    /// one place of the tile, a coat whose exposure is not positive is black.
     pub fn new(mesh: &'a TexturedMesh, coats: &[Coat<'a>]) -> Self {
         let sizes = texel_sizes(mesh);
+        let entries = coats.iter().enumerate().flat_map(|(k, coat)| coat.charts.iter().map(move |&chart| (chart, k)));
+        let coat_of: BTreeMap<u32, usize> = entries.collect();
         let coated = |face: usize| {
-            let chart = mesh.face_charts.get(face)?;
-            let index = coats.iter().position(|coat| coat.charts.contains(chart))?;
+            let index = *coat_of.get(mesh.face_charts.get(face)?)?;
             let width = coats[index].sampler.frame().width;
             let scale = sizes[face] * width as f64 / coats[index].tile_size;
             Some(CoatedFace { coat: index, scale, is_mirrored: is_mirrored(mesh, face) })
@@ -152,13 +156,14 @@ impl Lit<'_> {
         let frame = if is_back { frame.turned_over() } else { frame };
         let prepared = &self.coats.coats[face.coat];
         let taps = prepared.taps(&face, is_back, spot, self.coats.mesh.atlas_size);
-        let view = frame.above(&to_eye);
+        let view = raised(&frame.above(&to_eye), prepared.lowest_view).cast();
         let mut sum = [0.0; 3];
         for light in &self.lighting.lights {
             let Some((toward, irradiance)) = light.at(&position.into()) else { continue };
             let toward = frame.local(&toward);
             if let Some(share) = prepared.share(&toward) {
-                let radiance = prepared.radiance(&taps, &toward.cast(), &view.cast());
+                let toward = raised(&toward, prepared.lowest_light).cast();
+                let radiance = prepared.radiance(&taps, &toward, &view);
                 (0..3).for_each(|c| sum[c] += irradiance[c] * share * radiance[c]);
             }
         }
@@ -169,8 +174,9 @@ impl Lit<'_> {
 impl<'a> Prepared<'a> {
     fn new(coat: &Coat<'a>) -> Self {
         let frame = coat.sampler.frame();
-        let lowest = frame.lights.vectors().iter().map(|l| l.z).fold(1.0, f64::min);
-        Self { coat: *coat, size: [frame.width, frame.height], lowest_light: lowest.max(1e-3) }
+        let lowest = |set: &DirectionSet| set.vectors().iter().map(|d| d.z).fold(1.0, f64::min).max(1e-3);
+        let (lowest_light, lowest_view) = (lowest(&frame.lights), lowest(&frame.views));
+        Self { coat: *coat, size: [frame.width, frame.height], lowest_light, lowest_view }
     }
 
     /// Texels under a spot, and their weights.
@@ -205,6 +211,15 @@ impl<'a> Prepared<'a> {
     }
 }
 
+/// A unit vector brought up to a height, its azimuth kept.
+fn raised(v: &Vector3<f64>, lowest: f64) -> Vector3<f64> {
+    if v.z >= lowest {
+        return *v;
+    }
+    let across = Vector3::new(v.x, v.y, 0.0).try_normalize(0.0).unwrap_or_default();
+    Vector3::new(0.0, 0.0, lowest) + across * (1.0 - lowest * lowest).max(0.0).sqrt()
+}
+
 /// Weights of a face's corners at texture coordinates; the middle of a face without area in the atlas.
 fn barycentric(corners: &Corners, uv: &Point2<f64>) -> [f64; 3] {
     let [a, b, c] = corners.uvs;
@@ -234,6 +249,9 @@ impl std::fmt::Debug for Coat<'_> {
         f.debug_struct("Coat").field("charts", &self.charts).field("tile_size", &self.tile_size).finish()
     }
 }
+
+#[cfg(test)]
+mod tests;
 
 #[cfg(test)]
 mod tests;
