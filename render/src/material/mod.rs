@@ -24,10 +24,10 @@
 pub mod environment;
 pub mod frame;
 mod light;
-mod synthesized;
+mod synthesized_tile;
 
 pub use light::{Light, Lighting};
-pub use synthesized::Synthesized;
+pub use synthesized_tile::SynthesizedTile;
 
 use crate::face::{Corners, corners};
 use capture::btf::Encoding;
@@ -103,7 +103,7 @@ struct Prepared<'a> {
 }
 
 impl<'a> Coat<'a> {
-    /// A coat of a stored material; `sampler` is the material's own, or a [`Synthesized`] of it.
+    /// A coat of a stored material; `sampler` is the material's own, or a [`SynthesizedTile`] of it.
     pub fn of(material: &Material, sampler: &'a dyn Sampler, charts: &'a [u32], tile_size: f64) -> Self {
         Self {
             charts,

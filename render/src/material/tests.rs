@@ -228,7 +228,7 @@ fn an_eye_along_the_surface_looks_no_lower_than_was_measured() {
 fn a_synthesized_material_is_interpolated_between_measured_directions() {
     let linear =
         Closed { frame: frame(2, 3), of: |texel, l: &Vector3<f32>, v: &Vector3<f32>| [0.1 * texel as f32, l.z, v.z] };
-    let kept = Synthesized::new(&linear, [2, 3], 7);
+    let kept = SynthesizedTile::new(&linear, [2, 3], 7);
     let directions = bonn_directions();
     let (a, b) = (directions[30].cast(), directions[70].cast());
     let found = kept.value(3, &a, &b);

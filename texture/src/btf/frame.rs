@@ -47,6 +47,16 @@ impl Frame {
         self.width * self.height
     }
 
+    /// The measured pairs about a light and a view, numbered view · lights + light, and their weights; unused
+    /// ones have weight 0.
+    pub fn blend(&self, light: &Vector3<f32>, view: &Vector3<f32>) -> [(usize, f32); 9] {
+        let (light, view) = (self.lights.blend(light), self.views.blend(view));
+        std::array::from_fn(|i| {
+            let ((v, a), (l, b)) = (view.entries[i / 3], light.entries[i % 3]);
+            (v as usize * self.lights.len() + l as usize, a * b)
+        })
+    }
+
     /// Pairs of view and light.
     pub fn pairs(&self) -> usize {
         self.views.len() * self.lights.len()

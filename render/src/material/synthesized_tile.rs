@@ -12,7 +12,7 @@ use texture::btf::{Frame, Sampler, Synthesizer};
 const STEPS: f32 = 65535.0;
 
 /// A synthesized tile.
-pub struct Synthesized<'a> {
+pub struct SynthesizedTile<'a> {
     synthesizer: &'a dyn Synthesizer,
     seed: u64,
     frame: Frame,
@@ -20,7 +20,7 @@ pub struct Synthesized<'a> {
     pictures: Vec<OnceLock<Vec<u16>>>,
 }
 
-impl<'a> Synthesized<'a> {
+impl<'a> SynthesizedTile<'a> {
     /// A tile of `size` (columns, rows) texels.
     pub fn new(synthesizer: &'a dyn Synthesizer, size: [usize; 2], seed: u64) -> Self {
         let frame = Frame { width: size[0], height: size[1], ..synthesizer.frame().clone() };
@@ -40,7 +40,7 @@ impl<'a> Synthesized<'a> {
     }
 }
 
-impl Sampler for Synthesized<'_> {
+impl Sampler for SynthesizedTile<'_> {
     fn frame(&self) -> &Frame {
         &self.frame
     }
@@ -58,8 +58,8 @@ impl Sampler for Synthesized<'_> {
     }
 }
 
-impl std::fmt::Debug for Synthesized<'_> {
+impl std::fmt::Debug for SynthesizedTile<'_> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Synthesized").field("frame", &self.frame).field("seed", &self.seed).finish_non_exhaustive()
+        f.debug_struct("SynthesizedTile").field("frame", &self.frame).field("seed", &self.seed).finish_non_exhaustive()
     }
 }
