@@ -165,7 +165,7 @@ fn grid_aligned_edges_leave_no_holes() {
 fn a_film_of_a_knot() {
     let (mesh, atlas) = (knot(400, 20), atlas(1024, 1024));
     let aabb = mesh.mesh.aabb().unwrap();
-    let cameras = render::path::turntable_cameras(&aabb, None, 4, 320, 240, nalgebra::Vector3::z());
+    let cameras = render::path::turntable_cameras(&aabb, None, 4, 320, 240, Vector3::z());
     let mut player = cpu::Player::new(&mesh, at(2));
     let frames: Vec<_> = cameras.iter().map(|camera| player.render(&atlas, camera)).collect();
     for frame in &frames {

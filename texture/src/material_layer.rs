@@ -92,12 +92,15 @@ pub(crate) fn check(layers: &[MaterialLayer], face_charts: &[u32]) -> Result<(),
 /// Paints what plain viewers show: charts with a material as they look from above, lit from there such that a
 /// white matt surface would be white. `atlas` is in levels of 0..=255.
 pub(crate) fn paint(atlas: &mut Image<[f32; 3]>, mesh: &TexturedMesh, layers: &[MaterialLayer]) {
-    let sizes = texel_sizes(mesh);
+    if layers.is_empty() {
+        return;
+    }
+    let (sizes, texels) = (texel_sizes(mesh), rasterize(mesh).texels);
     for layer in layers {
         let look = seen_from_above(&layer.material);
         let per_texel = look.width() as f64 / layer.tile_size;
         let is_covered = |face: usize| layer.charts.binary_search(&mesh.face_charts[face]).is_ok();
-        for texel in rasterize(mesh).texels.iter().filter(|t| is_covered(t.face as usize)) {
+        for texel in texels.iter().filter(|t| is_covered(t.face as usize)) {
             let scale = sizes[texel.face as usize] * per_texel;
             let down = if is_mirrored(mesh, texel.face as usize) { -scale } else { scale };
             let (column, row) = (scale * (f64::from(texel.x) + 0.5), down * (f64::from(texel.y) + 0.5));

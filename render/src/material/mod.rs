@@ -24,14 +24,15 @@
 pub mod environment;
 pub mod frame;
 mod light;
-mod synthesized_tile;
+mod tile;
 
 pub use light::{Light, Lighting};
-pub use synthesized_tile::SynthesizedTile;
+pub use tile::{SynthesizedTile, Tile};
 
 use crate::face::{Corners, corners};
+use capture::Image;
 use capture::btf::Encoding;
-use frame::Frames;
+use frame::{Frames, TangentFrame};
 use geometry::TexturedMesh;
 use nalgebra::{Point2, Point3, Vector3};
 use std::collections::BTreeMap;
@@ -103,16 +104,34 @@ struct Prepared<'a> {
 }
 
 impl<'a> Coat<'a> {
-    /// A coat of a stored material; `sampler` is the material's own, or a [`SynthesizedTile`] of it.
-    pub fn of(material: &Material, sampler: &'a dyn Sampler, charts: &'a [u32], tile_size: f64) -> Self {
+    /// A coat of a stored material, answered for by a tile of it.
+    pub fn of(material: &Material, tile: &'a Tile<'a>, charts: &'a [u32], tile_size: f64) -> Self {
         Self {
             charts,
             tile_size,
-            sampler,
+            sampler: tile.sampler(),
             encoding: material.encoding,
             exposure: material.exposure,
             includes_cosine: material.includes_cosine,
         }
+    }
+
+    /// Linear radiance of one flat tile in the plane z = 0 with its middle at the origin, x along columns and y up
+    /// the rows, seen from the direction `view` throughout; lamps shine as they do at the middle.
+    pub fn picture(&self, lights: &[Light], view: &Vector3<f64>) -> Image<[f32; 3]> {
+        let prepared = Prepared::new(self);
+        let frame = TangentFrame { tangent: Vector3::x(), bitangent: Vector3::y(), normal: Vector3::z() };
+        let view = raised(&frame.above(view), prepared.lowest_view).cast();
+        let mut out = Image::filled(prepared.size[0], prepared.size[1], [0.0; 3]);
+        for (toward, irradiance) in lights.iter().filter_map(|light| light.at(&Point3::origin())) {
+            let toward = frame.local(&toward);
+            let Some(share) = prepared.share(&toward) else { continue };
+            let samples = self.sampler.picture(&raised(&toward, prepared.lowest_light).cast(), &view);
+            for (sum, sample) in out.pixels_mut().iter_mut().zip(samples.as_chunks::<3>().0) {
+                (0..3).for_each(|c| sum[c] += irradiance[c] * share * self.encoding.decode(sample[c]) / self.exposure);
+            }
+        }
+        out
     }
 }
 
@@ -249,9 +268,6 @@ impl std::fmt::Debug for Coat<'_> {
         f.debug_struct("Coat").field("charts", &self.charts).field("tile_size", &self.tile_size).finish()
     }
 }
-
-#[cfg(test)]
-mod tests;
 
 #[cfg(test)]
 mod tests;

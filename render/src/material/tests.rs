@@ -40,7 +40,7 @@ fn frame(width: usize, height: usize) -> Frame {
 }
 
 /// Radiance of white paint times `albedo`, linear, with the cosine.
-fn matt(albedo: [f32; 3]) -> Closed<impl Fn(usize, &Vector3<f32>, &Vector3<f32>) -> [f32; 3]> {
+fn matt(albedo: [f32; 3]) -> impl Sampler {
     Closed { frame: frame(4, 4), of: move |_, light: &Vector3<f32>, _: &Vector3<f32>| albedo.map(|a| a * light.z / PI) }
 }
 

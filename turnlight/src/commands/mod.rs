@@ -2,12 +2,15 @@
 
 pub(crate) mod board;
 pub(crate) mod btf;
+mod btf_render;
 pub(crate) mod capture;
 pub(crate) mod compare;
 pub(crate) mod demo;
 pub(crate) mod hull;
 pub(crate) mod import;
 pub(crate) mod info;
+mod light;
+mod material;
 pub(crate) mod model;
 pub(crate) mod render;
 pub(crate) mod synth;

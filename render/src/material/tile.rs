@@ -1,15 +1,24 @@
-//! A codec that reproduces statistics, as one that can be asked texel by texel.
+//! What answers for the texels of a material, sampled or synthesized.
 //!
 //! A synthesizer makes whole pictures; one per look-up would be hopeless. So the picture of a pair of
 //! *measured* directions is made when it is first asked for and kept (6 bytes a texel), and directions between are
-//! interpolated from up to 3 × 3 of them. The same seed makes the same surface under all of them.
+//! interpolated from up to 3 × 3 of them. The same seed makes the same surface under all of them. A flat
+//! tile under one light and view is made for just these.
 
 use nalgebra::Vector3;
 use std::sync::OnceLock;
-use texture::btf::{Frame, Sampler, Synthesizer};
+use texture::btf::{Answer, Frame, Material, Sampler, Synthesizer};
 
 /// One step of a kept sample.
 const STEPS: f32 = 65535.0;
+
+/// A material as both renderers ask for it.
+pub enum Tile<'a> {
+    /// As measured.
+    Sampled(&'a dyn Sampler),
+    /// Made.
+    Synthesized(SynthesizedTile<'a>),
+}
 
 /// A synthesized tile.
 pub struct SynthesizedTile<'a> {
@@ -18,6 +27,27 @@ pub struct SynthesizedTile<'a> {
     frame: Frame,
     /// Per (view, light): (y, x, channel), 0..=1 in 16 bits.
     pictures: Vec<OnceLock<Vec<u16>>>,
+}
+
+impl<'a> Tile<'a> {
+    /// The tile of a material; a synthesized one is as large as the one measured.
+    pub fn of(material: &'a Material, seed: u64) -> Self {
+        match material.codec.answer() {
+            Answer::Sampler(sampler) => Self::Sampled(sampler),
+            Answer::Synthesizer(synthesizer) => {
+                let frame = synthesizer.frame();
+                Self::Synthesized(SynthesizedTile::new(synthesizer, [frame.width, frame.height], seed))
+            }
+        }
+    }
+
+    /// What answers texel by texel.
+    pub fn sampler(&self) -> &dyn Sampler {
+        match self {
+            Self::Sampled(sampler) => *sampler,
+            Self::Synthesized(tile) => tile,
+        }
+    }
 }
 
 impl<'a> SynthesizedTile<'a> {
@@ -30,10 +60,8 @@ impl<'a> SynthesizedTile<'a> {
 
     fn sample(&self, view: usize, light: usize, texel: usize) -> [f32; 3] {
         let make = || {
-            let frame = &self.frame;
-            let (l, v) = (frame.lights.vectors()[light].cast(), frame.views.vectors()[view].cast());
-            let picture = self.synthesizer.picture([frame.width, frame.height], self.seed, &l, &v);
-            picture.into_iter().map(|s| (s.clamp(0.0, 1.0) * STEPS).round() as u16).collect()
+            let (l, v) = (self.frame.lights.vectors()[light].cast(), self.frame.views.vectors()[view].cast());
+            self.picture(&l, &v).into_iter().map(|s| (s.clamp(0.0, 1.0) * STEPS).round() as u16).collect()
         };
         let picture = self.pictures[view * self.frame.lights.len() + light].get_or_init(make);
         [0, 1, 2].map(|c| picture.get(3 * texel + c).map_or(0.0, |&s| f32::from(s) / STEPS))
@@ -55,6 +83,16 @@ impl Sampler for SynthesizedTile<'_> {
             }
         }
         sum
+    }
+
+    fn picture(&self, light: &Vector3<f32>, view: &Vector3<f32>) -> Vec<f32> {
+        self.synthesizer.picture([self.frame.width, self.frame.height], self.seed, light, view)
+    }
+}
+
+impl std::fmt::Debug for Tile<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Tile").field("frame", self.sampler().frame()).finish_non_exhaustive()
     }
 }
 
