@@ -134,7 +134,7 @@ mod tests {
     #[test]
     fn a_box_of_one_texel_is_bilinear() {
         let found = weights(2.25, 1.5, 0.1, [4, 3]);
-        // A quarter past the middle of nothing: between the centres 1.5 and 2.5, three quarters on.
+        // Three quarters of the way from the centre at 1.5 to that at 2.5.
         assert!((found[4 + 1] - 0.25).abs() < 1e-6 && (found[4 + 2] - 0.75).abs() < 1e-6, "{found:?}");
         assert_eq!(found.iter().filter(|w| **w > 0.0).count(), 2);
     }
