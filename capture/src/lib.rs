@@ -32,6 +32,7 @@ mod pixels;
 #[cfg(feature = "video")]
 mod saddle;
 pub mod silhouette;
+pub mod srgb;
 pub mod turntable;
 #[cfg(feature = "video")]
 pub mod video;
