@@ -21,6 +21,7 @@ pub mod choose;
 pub mod contour;
 pub mod doctor;
 mod error;
+mod exif;
 pub mod footage;
 mod formats;
 mod image;
