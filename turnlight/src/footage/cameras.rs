@@ -109,10 +109,12 @@ fn photographed(
         shots.push(Shot {
             source,
             sharpness: sharpness?,
+            blur_px: None,
             motion: 0.0,
             camera,
             pose: if camera.is_some() { PoseSource::Measured } else { PoseSource::Missing },
             angle: None,
+            angle_deviation: None,
             standpoint: None,
             corners: 0,
             rms_px: 0.0,
