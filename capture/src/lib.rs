@@ -14,6 +14,7 @@
 //! ```
 
 pub mod board;
+pub mod btf;
 pub mod calibrate;
 mod camera;
 mod capture_set;
