@@ -12,7 +12,7 @@ const MOST_EDGES: usize = 20;
 /// Fewer edges along a side tell nothing.
 const FEWEST_EDGES: usize = 3;
 /// Pixels on either side of an edge that are looked at, at most, and that are needed.
-const REACH: std::ops::RangeInclusive<f64> = 2.0..=16.0;
+const REACH: std::ops::RangeInclusive<f64> = 1.5..=16.0;
 /// Part of an edge that is looked at: its ends meet others.
 const MIDDLE: f64 = 0.6;
 /// Bins a pixel, across the edge.

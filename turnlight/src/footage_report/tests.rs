@@ -86,7 +86,7 @@ fn the_verdict_is_three_sentences_with_the_figures() {
     assert_eq!(first, "12 of 12 frames make the capture, all around in steps of 30.0°.");
     assert_eq!(
         second,
-        "The board reprojects to 0.12 px RMS, the focal length is 588.8 ± 0.4 px, the axis is known to 0.02° and \
+        "The board reprojects to 0.12 px RMS, the focal length is 588.8 ± 0.4 px, the axis is known to 0.020° and \
          silhouettes agree to 0.986 in the middle and 0.980 at worst (frame 0)."
     );
     assert_eq!(third, "Nothing needs filming again.");
