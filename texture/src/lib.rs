@@ -7,6 +7,7 @@
 
 pub mod appearance;
 mod bake;
+pub mod btf;
 mod coding;
 mod complete;
 pub mod directions;

@@ -11,7 +11,7 @@
 //! Refraction through Rough Surfaces", EGSR 2007; Schlick 1994; grooves as in Oren and Nayar 1994, by
 //! lengths of shadow in the cross-section.
 
-use super::directions::BtfDirection;
+use capture::btf::BtfDirection;
 use nalgebra::Vector3;
 use rayon::prelude::*;
 use std::f64::consts::{PI, TAU};

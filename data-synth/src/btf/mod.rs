@@ -12,14 +12,13 @@
 //! - The pattern is one period however many texels sample it, and the tile continues itself on all sides.
 
 pub mod analytic;
-mod directions;
 mod material;
 mod patch;
 mod tile;
 mod trace;
 mod write;
 
-pub use directions::{BtfDirection, DIRECTIONS};
+pub use capture::btf::{BtfDirection, DIRECTIONS};
 pub use material::BtfMaterial;
 pub use write::{BtfWritten, write_btf};
 

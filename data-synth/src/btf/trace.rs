@@ -5,7 +5,7 @@
 //! sample), and one scattered ray goes on to the next surface, where every light is asked for again. All
 //! lights share the paths, so what is left of noise looks the same under all of them.
 
-use super::directions::DIRECTIONS;
+use capture::btf::DIRECTIONS;
 use super::tile::{Point, Tile};
 use crate::material::Vec3;
 use crate::sampler::{Sampler, pixel_seed};

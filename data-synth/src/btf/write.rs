@@ -7,7 +7,7 @@
 //!
 //! Pictures are 8-bit sRGB PNG, or 32-bit float OpenEXR: lossless both, the second without exposure.
 
-use super::directions::{BtfDirection, DIRECTIONS};
+use capture::btf::{BtfDirection, DIRECTIONS};
 use super::material::BtfMaterial;
 use super::{BtfOptions, BtfStudio};
 use crate::error::{SynthError, io_error};

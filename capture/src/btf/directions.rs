@@ -48,6 +48,11 @@ impl BtfDirection {
     }
 }
 
+/// The unit vectors of [`BtfDirection::all`].
+pub fn bonn_directions() -> Vec<Vector3<f64>> {
+    BtfDirection::all().into_iter().map(BtfDirection::vector).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -1,0 +1,102 @@
+use super::*;
+
+/// A BTF of one view, whose light `l` shows the level `l / 4`.
+fn ramp(lights: usize) -> Btf {
+    let lights: Vec<Vector3<f64>> =
+        (0..lights).map(|l| Vector3::new((0.1 * l as f64).sin(), 0.0, (0.1 * l as f64).cos())).collect();
+    let samples = (0..lights.len()).flat_map(|l| [l as f32 / 4.0; 12]).collect();
+    Btf {
+        name: "ramp".into(),
+        views: vec![Vector3::z()],
+        lights,
+        width: 2,
+        height: 2,
+        encoding: Encoding::Srgb,
+        exposure: 1.0,
+        includes_cosine: true,
+        texel_pitch_mm: None,
+        samples,
+        measured: Vec::new(),
+    }
+}
+
+#[test]
+fn encodings_return_what_they_took() {
+    for encoding in [Encoding::Srgb, Encoding::Linear, Encoding::Log { floor: 0.1, peak: 1e5 }] {
+        for radiance in [0.0_f32, 1e-4, 0.02, 0.5, 1.0, 7.0, 1e5] {
+            let back = encoding.decode(encoding.encode(radiance));
+            assert!((back - radiance).abs() <= 2e-5 * radiance.max(1e-3), "{encoding:?} {radiance} {back}");
+        }
+    }
+}
+
+#[test]
+fn what_is_no_number_is_taken_from_the_nearest_light() {
+    let mut btf = ramp(4);
+    btf.samples[12 * 2 + 5] = f32::NAN;
+    btf.samples[12 * 3 + 5] = f32::INFINITY;
+    assert_eq!(btf.check().unwrap(), 2);
+    assert_eq!(btf.samples[12 * 2 + 5], 0.25);
+    assert_eq!(btf.samples[12 * 3 + 5], 0.25);
+}
+
+#[test]
+fn lengths_that_disagree_are_refused() {
+    let mut btf = ramp(3);
+    btf.samples.pop();
+    assert!(btf.check().unwrap_err().to_string().contains("needs 36 samples, 35 are there"));
+}
+
+/// A folder with a picture of one grey level per named pair of angles.
+fn folder(names: &[(&str, u8)]) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, level) in names {
+        image::RgbImage::from_pixel(3, 2, image::Rgb([*level; 3])).save(folder.path().join(name)).unwrap();
+    }
+    folder
+}
+
+#[test]
+fn angles_are_read_from_names_and_missing_pairs_filled() {
+    let folder = folder(&[
+        ("00000 tl000 pl000 tv000 pv000.png", 51),
+        ("00001 tl030 pl090 tv000 pv000.png", 102),
+        ("tl000_pl000_tv045_pv180.png", 204),
+    ]);
+    let btf = read(folder.path(), None).unwrap();
+    assert_eq!((btf.views.len(), btf.lights.len(), btf.width, btf.height), (2, 2, 3, 2));
+    assert!((btf.lights[1] - Vector3::new(0.0, 0.5, 0.75_f64.sqrt())).norm() < 1e-12);
+    assert_eq!([0, 1, 2, 3].map(|pair| btf.is_measured(pair / 2, pair % 2)), [true, true, true, false]);
+    // The light that is missing of the second view is filled from the other one.
+    assert!((btf.picture(1, 1)[0] - 0.8).abs() < 1e-6 && (btf.picture(0, 1)[0] - 0.4).abs() < 1e-6);
+}
+
+#[test]
+fn two_pictures_of_one_pair_are_refused() {
+    let folder = folder(&[("0 tl000 pl000 tv000 pv000.png", 1), ("1 tl000 pl360 tv000 pv000.png", 2)]);
+    assert!(read(folder.path(), None).unwrap_err().to_string().contains("same view and light"));
+}
+
+#[test]
+fn a_list_of_lights_names_its_pictures() {
+    let folder = folder(&[("lion 1.png", 51), ("lion 2.png", 255)]);
+    let list = folder.path().join("dirs.lp");
+    std::fs::write(&list, "2\r\nlion 1.png 0 0 2\r\nlion 2.png 3 0 4\r\n").unwrap();
+    let btf = read(folder.path(), Some(1)).unwrap();
+    assert_eq!((btf.views.len(), btf.width, btf.height), (1, 1, 1));
+    assert!((btf.lights[1] - Vector3::new(0.6, 0.0, 0.8)).norm() < 1e-12);
+    assert!((btf.picture(0, 0)[0] - 0.2).abs() < 1e-6 && btf.picture(0, 1)[0] == 1.0);
+    for (text, said) in
+        [("3\na 0 0 1\n", "3 pictures are announced"), ("1\na 0 0 -1\n", "below the surface"), ("", "number")]
+    {
+        std::fs::write(&list, text).unwrap();
+        assert!(read(&list, None).unwrap_err().to_string().contains(said), "{text}");
+    }
+}
+
+#[test]
+fn what_is_no_material_is_named() {
+    let file = tempfile::Builder::new().suffix(".txt").tempfile().unwrap();
+    assert!(read(file.path(), None).unwrap_err().to_string().contains("no measured material"));
+    assert!(read("nowhere.btf".as_ref(), None).is_err());
+}
