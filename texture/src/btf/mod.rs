@@ -32,6 +32,8 @@ pub mod multilevel_vq;
 pub mod pca;
 pub mod pca_view;
 pub mod ptm;
+mod random_field;
+pub mod statistics;
 
 pub use container::Part;
 pub use frame::{Blend, DirectionSet, Frame};
