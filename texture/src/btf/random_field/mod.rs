@@ -15,11 +15,11 @@
 //!
 //! A picture of light l and view v: `Y(x) = m(l,v) + d(l,v) · shape_k(T_k(s(x)) + Σ_j g_kj F_j(x; l, v))`, where k is
 //! the group of the pair (blended over the measured pairs about it), s(x) the place of the surface seen at texel x,
-//! T the random texture (stationary, of the models), F five features of the relief, m and d three numbers each.
+//! T the random texture (stationary, of the models), F eight features of the relief, m and d three numbers each.
 //!
 //! - *Parameters*: groups K ([`Options::groups`]), rank r of the moments.
 //! - *File*: 6 bytes; `⌈log₂ K⌉` bits a pair; the range map, a byte a texel; `r (views + 6 lights)` bytes of moments;
-//!   per group 34 bytes of gains, 52 of tones, and its model: gmrf and car2d 9 words of axes, 18 bits of neighbours
+//!   per group 52 bytes of gains, 52 of tones, and its model: gmrf and car2d 9 words of axes, 18 bits of neighbours
 //!   and 2 bytes per coefficient and noise for each of 3 components and up to 4 bands; car3d 9 words per neighbour.
 //!   Four bytes more for every step of a list. It grows with texels by the range map alone.
 //! - *Cost*: fit, one pass over the pictures for moments and groups, then eight pictures a group. A picture: one pair
@@ -72,6 +72,10 @@ const EXAMPLES: usize = 8;
 const UNEXPLAINED: f64 = 0.05;
 /// Added to the diagonal of a regression, as a share of it.
 const GAIN_RIDGE: f64 = 1e-3;
+/// Heights tried for the range map, over those of photometric stereo.
+const HEIGHT_SCALES: [f64; 6] = [0.5, 1.0, 1.5, 2.0, 3.0, 4.0];
+/// Pictures they are tried on.
+const CALIBRATION_PAIRS: usize = 60;
 /// Tries at a ratio.
 const RATIO_ROUNDS: usize = 6;
 
@@ -176,10 +180,12 @@ pub(super) fn fit<M: FieldModel>(btf: &Btf, options: &Options) -> Result<(Random
         return Err(TextureError::Degenerate { fault, remedy: "take 1 to 255".into() });
     }
     let size = [btf.width, btf.height];
-    let range_map = Numbers::new(&range_map::range_map(btf), options.precision, Width::Byte);
+    let (form, explained) = calibrated(btf, &Relief::new(range_map::range_map(btf), size));
+    let range_map = Numbers::new(form.heights(), options.precision, Width::Byte);
     let relief = Relief::new(range_map.values(), size);
     let prepared = Prepared { range_map, relief, descriptions: clusters::describe(&btf.samples, size) };
     let mut report = FitReport::default();
+    report.notes.push(format!("the range map explains {:.0} % of the pictures' variance", 100.0 * explained));
     let field = match options.groups {
         Groups::Count(count) => fit_groups(btf, &prepared, options, count.clamp(1, MOST_GROUPS), &mut report),
         Groups::Auto => {
@@ -282,12 +288,8 @@ fn look<M: FieldModel>(btf: &Btf, relief: &Relief, members: &[usize], bands: usi
     let examples: Vec<_> = members.iter().take(EXAMPLES).map(example).collect();
     let gains = Numbers::new(&regress(&examples), precision, Width::Word);
     let used = gains.values();
-    let left = |(channels, seen): &([Vec<f64>; 3], Vec<Seen>), c: usize| -> Vec<f64> {
-        let gains = &used[c * FEATURES..(c + 1) * FEATURES];
-        channels[c].iter().zip(seen).map(|(v, s)| v - product(gains, &s.features)).collect()
-    };
     let split: Vec<[Vec<Vec<f64>>; 3]> =
-        examples.iter().map(|e| [0, 1, 2].map(|c| pyramid::split(&left(e, c), size, bands))).collect();
+        examples.iter().map(|e| [0, 1, 2].map(|c| pyramid::split(&residual(e, &used, c), size, bands))).collect();
     let covariances = |(band, &size): (usize, &[usize; 2])| {
         let fields: Vec<[Vec<f64>; 3]> = split.iter().map(|s| [0, 1, 2].map(|c| s[c][band].clone())).collect();
         Covariances::of(&fields, size)
@@ -296,6 +298,38 @@ fn look<M: FieldModel>(btf: &Btf, relief: &Relief, members: &[usize], bands: usi
     let covariances: Vec<Covariances> = sizes.iter().enumerate().map(covariances).collect();
     let tones: Vec<f64> = (0..3).flat_map(|c| mean_tones(examples.iter().map(|e| &e.0[c]))).collect();
     Look { gains, tones: Numbers::new(&tones, precision, Width::Byte), field: M::estimate(&covariances, precision) }
+}
+
+/// The relief at the height at which it explains most of the pictures, and the share of variance it explains:
+/// photometric stereo sees fibres and interreflection as a flatter surface, parallax does not.
+fn calibrated(btf: &Btf, relief: &Relief) -> (Relief, f64) {
+    let explained = |relief: &Relief| -> f64 {
+        let shares: Vec<f64> = (0..CALIBRATION_PAIRS)
+            .into_par_iter()
+            .map(|k| explained_share(btf, relief, k * btf.pairs() / CALIBRATION_PAIRS))
+            .collect();
+        shares.iter().sum::<f64>() / CALIBRATION_PAIRS as f64
+    };
+    let scaled = HEIGHT_SCALES.iter().map(|&scale| relief.scaled(scale)).map(|relief| (explained(&relief), relief));
+    let best = scaled.max_by(|a, b| a.0.total_cmp(&b.0));
+    best.map_or_else(|| (relief.clone(), 0.0), |(share, relief)| (relief, share))
+}
+
+fn explained_share(btf: &Btf, relief: &Relief, pair: usize) -> f64 {
+    let (view, light) = (pair / btf.lights.len(), pair % btf.lights.len());
+    let channels: [Vec<f64>; 3] = [0, 1, 2].map(|c| centred_channel(btf.picture(view, light), c));
+    let energy = |channels: &[Vec<f64>; 3]| channels.iter().flatten().map(|v| v * v).sum::<f64>();
+    let before = energy(&channels);
+    let example = (channels, relief.seen(&btf.lights[light], &btf.views[view]));
+    let gains = regress(std::slice::from_ref(&example));
+    let after = energy(&[0, 1, 2].map(|c| residual(&example, &gains, c)));
+    if before > autoregression::CONSTANT { 1.0 - after / before } else { 0.0 }
+}
+
+/// What the relief leaves of a channel.
+fn residual((channels, seen): &([Vec<f64>; 3], Vec<Seen>), gains: &[f64], channel: usize) -> Vec<f64> {
+    let gains = &gains[channel * FEATURES..(channel + 1) * FEATURES];
+    channels[channel].iter().zip(seen).map(|(v, s)| v - product(gains, &s.features)).collect()
 }
 
 fn centred_channel(picture: &[f32], channel: usize) -> Vec<f64> {

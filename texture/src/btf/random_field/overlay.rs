@@ -1,7 +1,7 @@
 //! What light and view make of the range map: displacement and bump mapping.
 //!
 //! At each texel the ray from the eye finds the place of the surface that is seen there (what lies at height h shifts
-//! by `−h tan θ` along the view's azimuth), and a ray from there to the light whether it is lit. Five features of the
+//! by `−h tan θ` along the view's azimuth), and a ray from there to the light whether it is lit. Eight features of the
 //! place, without their means, are what pictures regress on:
 //!
 //! | feature | stands for |
@@ -11,11 +11,14 @@
 //! | height | light that only peaks receive, and colour that changes with depth |
 //! | mean height about, less height | hollows |
 //! | `n·v` | fuzz, seen at grazing angles |
+//! | 1 where lit | shadows that other light fills |
+//! | `n·l` | light that is scattered under the surface or between fibres before it leaves |
+//! | mean height about, over 9 × 9 texels | what is seen of the coarse form where fine relief hides it |
 
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
-pub(super) const FEATURES: usize = 5;
+pub(super) const FEATURES: usize = 8;
 /// Steps of a ray through the relief: half a texel each, at most as many.
 const MOST_STEPS: f64 = 96.0;
 /// Rays are no flatter than this: the cosine of 85°.
@@ -34,6 +37,7 @@ pub(super) struct Relief {
     /// Along x and down the rows.
     slopes: Vec<[f64; 2]>,
     hollows: Vec<f64>,
+    smooth: Vec<f64>,
     low: f64,
     high: f64,
 }
@@ -59,7 +63,17 @@ impl Relief {
         let (slopes, hollows) = (0..heights.len()).map(derived).unzip();
         let low = heights.iter().copied().fold(f64::INFINITY, f64::min);
         let high = heights.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        Self { size, slopes, hollows, low, high, heights }
+        let smooth = smoothed(&smoothed(&heights, size), size);
+        Self { size, slopes, hollows, smooth, low, high, heights }
+    }
+
+    /// The same form, higher or lower.
+    pub(super) fn scaled(&self, scale: f64) -> Self {
+        Self::new(self.heights.iter().map(|h| h * scale).collect(), self.size)
+    }
+
+    pub(super) fn heights(&self) -> &[f64] {
+        &self.heights
     }
 
     /// Under light and view, each texel of the reference plane, (y, x).
@@ -91,6 +105,9 @@ impl Relief {
             height / (self.high - self.low),
             self.sample(&self.hollows, place) / (self.high - self.low),
             n.dot(view),
+            lit,
+            n.dot(light),
+            self.sample(&self.smooth, place) / (self.high - self.low),
         ];
         let [x, y] = [0, 1].map(|axis| (place[axis].round() as isize).rem_euclid(self.size[axis] as isize) as usize);
         Seen { texel: y * self.size[0] + x, features }
@@ -149,4 +166,17 @@ impl Relief {
         };
         row(y) * (1.0 - v) + row(below) * v
     }
+}
+
+/// Means over 5 × 5 texels, wrapped.
+fn smoothed(field: &[f64], [width, height]: [usize; 2]) -> Vec<f64> {
+    let along = |field: &[f64], width: usize, height: usize| -> Vec<f64> {
+        let mean = |i: usize| {
+            let (x, row) = (i % width + 3 * width, i / width * width);
+            (0..5).map(|k| field[row + (x + k - 2) % width]).sum::<f64>() / 5.0
+        };
+        // Transposed on the way out, so that the second pass runs down the columns.
+        (0..field.len()).map(|j| mean(j % height * width + j / height)).collect()
+    };
+    along(&along(field, width, height), height, width)
 }
