@@ -1,7 +1,7 @@
 //! Originals beside what the random-field models make of them: per material (a folder, see `docs/btf-data.md`) three
 //! rows of light and view; original, then `gmrf`, `car2d`, `car3d`, each twice as large as the tile. Prints the
 //! statistics by which they are judged, means over 48 pairs.
-//! `btf_synthesis FILE.png GROUPS DATA..`
+//! `btf_synthesis FILE.png GROUPS|auto DATA..`
 
 use capture::btf::{Btf, read_folder};
 use nalgebra::Vector3;
@@ -19,11 +19,15 @@ const GAP: usize = 4;
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let [file, groups, data @ ..] = arguments.as_slice() else {
-        return Err("btf_synthesis FILE.png GROUPS DATA..".into());
+        return Err("btf_synthesis FILE.png GROUPS|auto DATA..".into());
     };
     let pitch = SIDE + GAP;
     let (width, height) = (pitch * (1 + KINDS.len()) - GAP, pitch * PAIRS.len() * data.len() - GAP);
     let mut sheet = image::RgbImage::from_pixel(width as u32, height as u32, image::Rgb([255; 3]));
+    let budget = match groups.parse() {
+        Ok(groups) => Budget::Components(groups),
+        Err(_) => Budget::Auto,
+    };
     println!("material codec groups bytes ratio fit_cpu_s mean dev_ratio emd autocorr spectrum_db band_db");
     for (block, folder) in data.iter().enumerate() {
         let btf = texture::btf::to_coded_range(read_folder(Path::new(folder), None)?);
@@ -32,12 +36,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             paste(&mut sheet, btf.picture(view, light), [btf.width, btf.height], [0, y]);
         }
         for (column, codec) in KINDS.into_iter().enumerate() {
-            let options = FitOptions {
-                codec,
-                budget: Budget::Components(groups.parse()?),
-                precision: Precision::Compact,
-                seed: 1,
-            };
+            let options = FitOptions { codec, budget, precision: Precision::Compact, seed: 1 };
             let start = cpu_seconds();
             let (material, report) = fit(btf.clone(), &options)?;
             let seconds = cpu_seconds() - start;

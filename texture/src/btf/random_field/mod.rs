@@ -18,14 +18,16 @@
 //! T the random texture (stationary, of the models), F eight features of the relief, m and d three numbers each.
 //!
 //! - *Parameters*: groups K ([`Options::groups`]), rank r of the moments.
-//! - *File*: 6 bytes; `⌈log₂ K⌉` bits a pair; the range map, a byte a texel; `r (views + 6 lights)` bytes of moments;
+//! - *File*: 7 bytes; `⌈log₂ K⌉` bits a pair; the range map, a byte a texel, and three for the
+//!   reflectance where it is kept; `r (views + 6 lights)` bytes of moments;
 //!   per group 52 bytes of gains, 52 of tones, and its model: gmrf and car2d 9 words of axes, 18 bits of neighbours
 //!   and 2 bytes per coefficient and noise for each of 3 components and up to 4 bands; car3d 9 words per neighbour.
 //!   Four bytes more for every step of a list. It grows with texels by the range map alone.
 //! - *Cost*: fit, one pass over the pictures for moments and groups, then eight pictures a group. A picture: one pair
 //!   of Fourier transforms per channel and band, two rays a texel.
 //! - *Not published, added here*: gains by least squares instead of one bump mapping; separable moments between
-//!   directions; the tones of the histogram. Published, left out: Bayesian choice of neighbours by the full
+//!   directions; the tones of the histogram; as an option
+//!   ([`Options::reflectance`]) a tiled map of what each texel reflects. Published, left out: Bayesian choice of neighbours by the full
 //!   posterior (its leading terms are used).
 //! - *Limits*: what the range map does not show (patterns of colour) comes back as noise of the right spectrum and
 //!   histogram. Judge by [`statistics`](super::statistics), not texel by texel.
@@ -54,7 +56,7 @@ use capture::btf::{Btf, bonn_directions};
 use clusters::{Clusters, Description};
 use fourier::{Fourier, Wave, frequency};
 use moments::{Moments, TONES};
-use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use numbers::{Numbers, Width};
 use overlay::{FEATURES, Relief, Seen};
 use rayon::prelude::*;
@@ -79,6 +81,12 @@ const CALIBRATION_PAIRS: usize = 60;
 /// Tries at a ratio.
 const RATIO_ROUNDS: usize = 6;
 
+/// Features of the relief, and two of the reflectance.
+const CUES: usize = FEATURES + 2;
+
+/// A picture's channels without their means, and what is seen at its texels.
+type Example = ([Vec<f64>; 3], Vec<Seen>);
+
 /// How many groups of pictures have parameters of their own.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Groups {
@@ -97,6 +105,9 @@ pub struct Options {
     pub groups: Groups,
     /// Singular pairs of the matrix of means and deviations, 1 to 255.
     pub moment_rank: usize,
+    /// Keep beside the range map what each texel reflects, three bytes a texel: the published models do not, and
+    /// lose what is colour and not relief.
+    pub reflectance: bool,
     /// How numbers are stored.
     pub precision: Precision,
     /// Of the groups' starts.
@@ -125,6 +136,8 @@ pub(super) struct RandomField<M> {
     bands: usize,
     /// Heights in texels, (y, x).
     range_map: Numbers,
+    /// (channel, y, x), where it is kept.
+    reflectance: Option<Numbers>,
     moments: Moments,
     /// Per pair, (view, light); empty where there is one group.
     group_of: Vec<u16>,
@@ -134,23 +147,33 @@ pub(super) struct RandomField<M> {
 /// How the pictures of a group look.
 #[derive(Clone, Debug, PartialEq)]
 struct Look<M> {
-    /// (channel, feature).
+    /// (channel, cue).
     gains: Numbers,
     /// (channel, level), of standardised values.
     tones: Numbers,
     field: M,
 }
 
+/// The regular part of a material, at some size.
+#[derive(Clone, Debug)]
+struct Surface {
+    relief: Relief,
+    /// (channel, y, x); empty where it is not kept.
+    reflectance: Vec<f64>,
+}
+
 /// What does not depend on the number of groups.
 struct Prepared {
     range_map: Numbers,
-    relief: Relief,
+    reflectance: Option<Numbers>,
+    surface: Surface,
     descriptions: Vec<Description>,
 }
 
 impl Options {
     /// Standard: 20 groups. `Components`: that many. `Ratio`: as many as fit. `Quality`: from 1 (0) to 256 (100), in
-    /// geometric steps. `Auto`: [`Groups::Auto`].
+    /// geometric steps; above 50 with the reflectance. `Auto`: [`Groups::Auto`], with the reflectance. All others are
+    /// without, as published.
     ///
     /// # Errors
     /// Where a number is out of range.
@@ -169,7 +192,8 @@ impl Options {
                 return Err(TextureError::Degenerate { fault, remedy });
             }
         };
-        Ok(Self { groups, moment_rank: STANDARD_RANK, precision, seed })
+        let reflectance = matches!(budget, Budget::Auto) || matches!(budget, Budget::Quality(q) if q > 50.0);
+        Ok(Self { groups, moment_rank: STANDARD_RANK, reflectance, precision, seed })
     }
 }
 
@@ -180,12 +204,18 @@ pub(super) fn fit<M: FieldModel>(btf: &Btf, options: &Options) -> Result<(Random
         return Err(TextureError::Degenerate { fault, remedy: "take 1 to 255".into() });
     }
     let size = [btf.width, btf.height];
-    let (form, explained) = calibrated(btf, &Relief::new(range_map::range_map(btf), size));
-    let range_map = Numbers::new(form.heights(), options.precision, Width::Byte);
-    let relief = Relief::new(range_map.values(), size);
-    let prepared = Prepared { range_map, relief, descriptions: clusters::describe(&btf.samples, size) };
+    let reflectance = options.reflectance.then(|| range_map::reflectance(btf));
+    let reflectance = reflectance.map(|r| Numbers::new(&r, options.precision, Width::Byte));
+    let measured = Surface {
+        relief: Relief::new(range_map::range_map(btf), size),
+        reflectance: reflectance.as_ref().map_or_else(Vec::new, Numbers::values),
+    };
+    let (calibrated, explained) = calibrated(btf, &measured);
+    let range_map = Numbers::new(calibrated.relief.heights(), options.precision, Width::Byte);
+    let surface = Surface { relief: Relief::new(range_map.values(), size), ..calibrated };
+    let prepared = Prepared { range_map, reflectance, surface, descriptions: clusters::describe(&btf.samples, size) };
     let mut report = FitReport::default();
-    report.notes.push(format!("the range map explains {:.0} % of the pictures' variance", 100.0 * explained));
+    report.notes.push(format!("the tiled maps explain {:.0} % of the pictures' variance", 100.0 * explained));
     let field = match options.groups {
         Groups::Count(count) => fit_groups(btf, &prepared, options, count.clamp(1, MOST_GROUPS), &mut report),
         Groups::Auto => {
@@ -215,12 +245,13 @@ fn fit_groups<M: FieldModel>(
     }
     let bands = pyramid::band_count([btf.width, btf.height]);
     let Clusters { of, members, .. } = clusters;
-    let looks = members.par_iter().map(|m| look(btf, &prepared.relief, m, bands, options.precision)).collect();
+    let looks = members.par_iter().map(|m| look(btf, &prepared.surface, m, bands, options.precision)).collect();
     RandomField {
         frame: Frame::of(btf),
         precision: options.precision,
         bands,
         range_map: prepared.range_map.clone(),
+        reflectance: prepared.reflectance.clone(),
         moments: Moments::of(btf, options.moment_rank, options.precision),
         group_of: if groups > 1 { of } else { Vec::new() },
         looks,
@@ -278,15 +309,15 @@ fn header_bytes(btf: &Btf) -> usize {
 }
 
 /// Estimates what a group's pictures have in common.
-fn look<M: FieldModel>(btf: &Btf, relief: &Relief, members: &[usize], bands: usize, precision: Precision) -> Look<M> {
+fn look<M: FieldModel>(btf: &Btf, surface: &Surface, members: &[usize], bands: usize, precision: Precision) -> Look<M> {
     let size = [btf.width, btf.height];
     let example = |&pair: &usize| {
         let (view, light) = (pair / btf.lights.len(), pair % btf.lights.len());
         let channels: [Vec<f64>; 3] = [0, 1, 2].map(|c| centred_channel(btf.picture(view, light), c));
-        (channels, relief.seen(&btf.lights[light], &btf.views[view]))
+        (channels, surface.seen(&btf.lights[light], &btf.views[view]))
     };
     let examples: Vec<_> = members.iter().take(EXAMPLES).map(example).collect();
-    let gains = Numbers::new(&regress(&examples), precision, Width::Word);
+    let gains = Numbers::new(&regress(&examples, surface.cues()), precision, Width::Word);
     let used = gains.values();
     let split: Vec<[Vec<Vec<f64>>; 3]> =
         examples.iter().map(|e| [0, 1, 2].map(|c| pyramid::split(&residual(e, &used, c), size, bands))).collect();
@@ -302,34 +333,34 @@ fn look<M: FieldModel>(btf: &Btf, relief: &Relief, members: &[usize], bands: usi
 
 /// The relief at the height at which it explains most of the pictures, and the share of variance it explains:
 /// photometric stereo sees fibres and interreflection as a flatter surface, parallax does not.
-fn calibrated(btf: &Btf, relief: &Relief) -> (Relief, f64) {
-    let explained = |relief: &Relief| -> f64 {
+fn calibrated(btf: &Btf, surface: &Surface) -> (Surface, f64) {
+    let explained = |surface: &Surface| -> f64 {
         let shares: Vec<f64> = (0..CALIBRATION_PAIRS)
             .into_par_iter()
-            .map(|k| explained_share(btf, relief, k * btf.pairs() / CALIBRATION_PAIRS))
+            .map(|k| explained_share(btf, surface, k * btf.pairs() / CALIBRATION_PAIRS))
             .collect();
         shares.iter().sum::<f64>() / CALIBRATION_PAIRS as f64
     };
-    let scaled = HEIGHT_SCALES.iter().map(|&scale| relief.scaled(scale)).map(|relief| (explained(&relief), relief));
+    let scaled = HEIGHT_SCALES.iter().map(|&scale| Surface { relief: surface.relief.scaled(scale), ..surface.clone() });
+    let scaled = scaled.map(|surface| (explained(&surface), surface));
     let best = scaled.max_by(|a, b| a.0.total_cmp(&b.0));
-    best.map_or_else(|| (relief.clone(), 0.0), |(share, relief)| (relief, share))
+    best.map_or_else(|| (surface.clone(), 0.0), |(share, surface)| (surface, share))
 }
 
-fn explained_share(btf: &Btf, relief: &Relief, pair: usize) -> f64 {
+fn explained_share(btf: &Btf, surface: &Surface, pair: usize) -> f64 {
     let (view, light) = (pair / btf.lights.len(), pair % btf.lights.len());
     let channels: [Vec<f64>; 3] = [0, 1, 2].map(|c| centred_channel(btf.picture(view, light), c));
     let energy = |channels: &[Vec<f64>; 3]| channels.iter().flatten().map(|v| v * v).sum::<f64>();
     let before = energy(&channels);
-    let example = (channels, relief.seen(&btf.lights[light], &btf.views[view]));
-    let gains = regress(std::slice::from_ref(&example));
+    let example = (channels, surface.seen(&btf.lights[light], &btf.views[view]));
+    let gains = regress(std::slice::from_ref(&example), surface.cues());
     let after = energy(&[0, 1, 2].map(|c| residual(&example, &gains, c)));
     if before > autoregression::CONSTANT { 1.0 - after / before } else { 0.0 }
 }
 
 /// What the relief leaves of a channel.
-fn residual((channels, seen): &([Vec<f64>; 3], Vec<Seen>), gains: &[f64], channel: usize) -> Vec<f64> {
-    let gains = &gains[channel * FEATURES..(channel + 1) * FEATURES];
-    channels[channel].iter().zip(seen).map(|(v, s)| v - product(gains, &s.features)).collect()
+fn residual((channels, seen): &Example, gains: &[f64], channel: usize) -> Vec<f64> {
+    channels[channel].iter().zip(seen).map(|(v, s)| v - product(gains, s, channel)).collect()
 }
 
 fn centred_channel(picture: &[f32], channel: usize) -> Vec<f64> {
@@ -338,21 +369,25 @@ fn centred_channel(picture: &[f32], channel: usize) -> Vec<f64> {
     values.iter().map(|v| v - mean).collect()
 }
 
-/// Gains (channel, feature) by least squares over all examples.
-fn regress(examples: &[([Vec<f64>; 3], Vec<Seen>)]) -> Vec<f64> {
-    let mut gram = SMatrix::<f64, FEATURES, FEATURES>::zeros();
-    let mut moments = [SVector::<f64, FEATURES>::zeros(); 3];
-    for (channels, seen) in examples {
-        for (texel, s) in seen.iter().enumerate() {
-            let f = SVector::from(s.features);
-            gram += f * f.transpose();
-            moments.iter_mut().zip(channels).for_each(|(m, channel)| *m += f * channel[texel]);
+/// Gains (channel, cue) by least squares over all examples.
+fn regress(examples: &[Example], cues: usize) -> Vec<f64> {
+    (0..3).flat_map(|channel| regress_channel(examples, cues, channel)).collect()
+}
+
+fn regress_channel(examples: &[Example], cues: usize, channel: usize) -> Vec<f64> {
+    let mut gram = DMatrix::<f64>::zeros(cues, cues);
+    let mut moment = DVector::<f64>::zeros(cues);
+    for (s, value) in examples.iter().flat_map(|(channels, seen)| seen.iter().zip(&channels[channel])) {
+        let f: [f64; CUES] = cues_of(s, channel);
+        for i in 0..cues {
+            moment[i] += f[i] * value;
+            (0..cues).for_each(|j| gram[(i, j)] += f[i] * f[j]);
         }
     }
     let floor = 1e-9 * (1.0 + gram.trace());
-    (0..FEATURES).for_each(|i| gram[(i, i)] += GAIN_RIDGE * gram[(i, i)] + floor);
-    let solve = |m: &SVector<f64, FEATURES>| gram.cholesky().map_or_else(SVector::zeros, |c| c.solve(m));
-    moments.iter().flat_map(|m| solve(m).iter().copied().collect::<Vec<_>>()).collect()
+    (0..cues).for_each(|i| gram[(i, i)] += GAIN_RIDGE * gram[(i, i)] + floor);
+    let solved = gram.cholesky().map(|c| c.solve(&moment));
+    solved.map_or_else(|| vec![0.0; cues], |gains| gains.iter().copied().collect())
 }
 
 fn mean_tones<'a>(channels: impl Iterator<Item = &'a Vec<f64>> + Clone) -> [f64; TONES] {
@@ -366,8 +401,36 @@ fn mean_tones<'a>(channels: impl Iterator<Item = &'a Vec<f64>> + Clone) -> [f64;
     mean
 }
 
-fn product(gains: &[f64], features: &[f64; FEATURES]) -> f64 {
-    gains.iter().zip(features).map(|(g, f)| g * f).sum()
+/// What a channel regresses on: the relief's features, then reflectance, as it is and lit.
+fn cues_of(seen: &Seen, channel: usize) -> [f64; CUES] {
+    let mut cues = [0.0; CUES];
+    cues[..FEATURES].copy_from_slice(&seen.features);
+    cues[FEATURES] = seen.reflectance[channel];
+    cues[FEATURES + 1] = seen.reflectance[channel] * seen.features[0];
+    cues
+}
+
+/// The regular part of a texel's channel; `gains` are (channel, cue).
+fn product(gains: &[f64], seen: &Seen, channel: usize) -> f64 {
+    let cues = gains.len() / 3;
+    gains[channel * cues..(channel + 1) * cues].iter().zip(cues_of(seen, channel)).map(|(g, f)| g * f).sum()
+}
+
+impl Surface {
+    /// The relief's features, and the reflectance of what is seen.
+    fn seen(&self, light: &Vector3<f64>, view: &Vector3<f64>) -> Vec<Seen> {
+        let mut seen = self.relief.seen(light, view);
+        let texels = seen.len();
+        if !self.reflectance.is_empty() {
+            seen.iter_mut().for_each(|s| s.reflectance = [0, 1, 2].map(|c| self.reflectance[c * texels + s.texel]));
+        }
+        seen
+    }
+
+    /// What a channel regresses on, in number.
+    fn cues(&self) -> usize {
+        if self.reflectance.is_empty() { FEATURES } else { CUES }
+    }
 }
 
 impl<M: FieldModel> RandomField<M> {
@@ -385,22 +448,31 @@ impl<M: FieldModel> RandomField<M> {
         let blends = [self.frame.views.blend(&view.cast()), self.frame.lights.blend(&light.cast())];
         let looks = self.looks_about(&blends[0], &blends[1]);
         let moments = self.moments.at(&blends[0], &blends[1]);
-        let heights = tile::tiled(&self.range_map.values(), [self.frame.width, self.frame.height], size);
-        let seen = Relief::new(heights, size).seen(&light, &view);
+        let seen = self.surface(size).seen(&light, &view);
         let textures = self.textures(size, seed, &looks);
         let gains = blended(&looks, |look| look.gains.values());
         let tones = blended(&looks, |look| look.tones.values());
         let mut picture = vec![0.0; 3 * size[0] * size[1]];
         for c in 0..3 {
-            let gains = &gains[c * FEATURES..(c + 1) * FEATURES];
-            let mut values: Vec<f64> =
-                seen.iter().map(|s| textures[c][s.texel] + product(gains, &s.features)).collect();
+            let mut values: Vec<f64> = seen.iter().map(|s| textures[c][s.texel] + product(&gains, s, c)).collect();
             moments::shape(&mut values, &std::array::from_fn(|i| tones[c * TONES + i]));
             let (mean, deviation) = (moments[c], moments[3 + c].max(0.0));
             let places = picture.iter_mut().skip(c).step_by(3);
             places.zip(values).for_each(|(p, v)| *p = (mean + deviation * v).max(0.0) as f32);
         }
         picture
+    }
+
+    /// The regular part at a size.
+    fn surface(&self, size: [usize; 2]) -> Surface {
+        let heights = self.range_map.values();
+        let texels = tile::tiled(&heights, [self.frame.width, self.frame.height], size);
+        let reflectance = self.reflectance.as_ref().map_or_else(Vec::new, Numbers::values);
+        let channels = reflectance.chunks_exact(heights.len());
+        Surface {
+            reflectance: channels.flat_map(|channel| texels.iter().map(|&t| channel[t])).collect(),
+            relief: Relief::new(texels.iter().map(|&t| heights[t]).collect(), size),
+        }
     }
 
     /// The groups of the measured pairs about a pair, with their weights.
@@ -443,6 +515,7 @@ impl<M: FieldModel> RandomField<M> {
     pub(super) fn write(&self, out: &mut Writer) {
         out.part("groups");
         out.u8(u8::from(self.precision == Precision::Compact));
+        out.u8(u8::from(self.reflectance.is_some()));
         out.u8(self.bands as u8);
         out.u8(self.moments.rank() as u8);
         out.u16(self.looks.len() as u16);
@@ -450,6 +523,10 @@ impl<M: FieldModel> RandomField<M> {
         out.align();
         out.part("range map");
         self.range_map.write(out);
+        if let Some(reflectance) = &self.reflectance {
+            out.part("reflectance");
+            reflectance.write(out);
+        }
         out.part("moments");
         self.moments.write(out);
         out.part("looks");
@@ -462,6 +539,7 @@ impl<M: FieldModel> RandomField<M> {
 
     pub(super) fn read(from: &mut Reader<'_>, frame: Frame) -> Result<Self, Fault> {
         let precision = if from.u8()? == 0 { Precision::Full } else { Precision::Compact };
+        let with_reflectance = from.u8()? != 0;
         let bands = usize::from(from.u8()?);
         if bands != pyramid::band_count([frame.width, frame.height]) {
             return Err(Fault(format!("{bands} bands for a tile of {} × {}", frame.width, frame.height)));
@@ -473,14 +551,17 @@ impl<M: FieldModel> RandomField<M> {
         }
         let group_of = read_groups(from, frame.pairs(), groups)?;
         let range_map = Numbers::read(from, frame.texels(), precision, Width::Byte)?;
+        let read = |from: &mut Reader<'_>| Numbers::read(from, 3 * frame.texels(), precision, Width::Byte);
+        let reflectance = if with_reflectance { Some(read(from)?) } else { None };
+        let cues = if with_reflectance { CUES } else { FEATURES };
         let moments = Moments::read(from, rank, &frame, precision)?;
         let mut looks = Vec::new();
         for _ in 0..groups {
-            let gains = Numbers::read(from, 3 * FEATURES, precision, Width::Word)?;
+            let gains = Numbers::read(from, 3 * cues, precision, Width::Word)?;
             let tones = Numbers::read(from, 3 * TONES, precision, Width::Byte)?;
             looks.push(Look { gains, tones, field: M::read(from, bands, precision)? });
         }
-        Ok(Self { frame, precision, bands, range_map, moments, group_of, looks })
+        Ok(Self { frame, precision, bands, range_map, reflectance, moments, group_of, looks })
     }
 }
 

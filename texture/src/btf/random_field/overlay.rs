@@ -9,12 +9,13 @@
 //! | `√max(0, n·l)` where lit | diffuse light, as encodings compress it |
 //! | `max(0, n·h)¹⁶` where lit | gloss |
 //! | height | light that only peaks receive, and colour that changes with depth |
-//! | mean height about, less height | hollows |
+//! | mean height over 5 × 5 texels, less height | hollows |
 //! | `n·v` | fuzz, seen at grazing angles |
 //! | 1 where lit | shadows that other light fills |
 //! | `n·l` | light that is scattered under the surface or between fibres before it leaves |
 //! | mean height about, over 9 × 9 texels | what is seen of the coarse form where fine relief hides it |
 
+use super::range_map::gradient;
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
@@ -48,22 +49,17 @@ pub(super) struct Seen {
     /// The texel of the surface, y · width + x.
     pub(super) texel: usize,
     pub(super) features: [f64; FEATURES],
+    /// Of three channels, 0 where it is not kept.
+    pub(super) reflectance: [f64; 3],
 }
 
 impl Relief {
     pub(super) fn new(heights: Vec<f64>, size: [usize; 2]) -> Self {
-        let [width, height] = size;
-        let at = |x: usize, y: usize| heights[y % height * width + x % width];
-        let derived = |i: usize| {
-            let (x, y) = (i % width, i / width);
-            let [left, right] = [at(x + width - 1, y), at(x + 1, y)];
-            let [above, below] = [at(x, y + height - 1), at(x, y + 1)];
-            ([(right - left) / 2.0, (below - above) / 2.0], (left + right + above + below) / 4.0 - at(x, y))
-        };
-        let (slopes, hollows) = (0..heights.len()).map(derived).unzip();
+        let smooth = smoothed(&smoothed(&heights, size), size);
+        let hollows = smoothed(&heights, size).iter().zip(&heights).map(|(mean, h)| mean - h).collect();
+        let slopes = gradient(&heights, size);
         let low = heights.iter().copied().fold(f64::INFINITY, f64::min);
         let high = heights.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        let smooth = smoothed(&smoothed(&heights, size), size);
         Self { size, slopes, hollows, smooth, low, high, heights }
     }
 
@@ -80,7 +76,7 @@ impl Relief {
     pub(super) fn seen(&self, light: &Vector3<f64>, view: &Vector3<f64>) -> Vec<Seen> {
         let count = self.heights.len();
         if self.high - self.low < FLAT {
-            return (0..count).map(|texel| Seen { texel, features: [0.0; FEATURES] }).collect();
+            return (0..count).map(|texel| Seen { texel, features: [0.0; FEATURES], reflectance: [0.0; 3] }).collect();
         }
         let middle = (light + view).try_normalize(1e-6).unwrap_or_else(Vector3::z);
         let mut seen: Vec<Seen> =
@@ -110,7 +106,7 @@ impl Relief {
             self.sample(&self.smooth, place) / (self.high - self.low),
         ];
         let [x, y] = [0, 1].map(|axis| (place[axis].round() as isize).rem_euclid(self.size[axis] as isize) as usize);
-        Seen { texel: y * self.size[0] + x, features }
+        Seen { texel: y * self.size[0] + x, features, reflectance: [0.0; 3] }
     }
 
     /// Where the ray through a point of the plane z = 0 first meets the surface, from above.

@@ -36,6 +36,40 @@ pub(super) fn integrate(size: [usize; 2], slopes: &[[f64; 2]]) -> Vec<f64> {
     fourier.inverse((0..p.len()).map(height).collect())
 }
 
+/// Slopes along x and down the rows: the inverse of [`integrate`].
+pub(super) fn gradient(heights: &[f64], size: [usize; 2]) -> Vec<[f64; 2]> {
+    let fourier = Fourier::new(size);
+    let spectrum = fourier.forward(heights);
+    let along = |axis: usize| {
+        let place = |i: usize| [i % size[0], i / size[0]][axis];
+        let slope = |(i, h): (usize, &Complex64)| h * Complex64::new(0.0, derivative(place(i), size[axis]));
+        fourier.inverse(spectrum.iter().enumerate().map(slope).collect())
+    };
+    along(0).into_iter().zip(along(1)).map(|(x, y)| [x, y]).collect()
+}
+
+/// What each texel reflects: its frontal pictures' mean over the lights, (channel, y, x), each without its mean.
+pub(super) fn reflectance(btf: &Btf) -> Vec<f64> {
+    let view = frontal_view(btf);
+    let (texels, lights) = (btf.texels(), btf.lights.len());
+    let at = |i: usize| -> f64 {
+        let (channel, texel) = (i / texels, i % texels);
+        (0..lights).map(|l| f64::from(btf.picture(view, l)[3 * texel + channel])).sum::<f64>() / lights as f64
+    };
+    let mut reflectance: Vec<f64> = (0..3 * texels).map(at).collect();
+    for channel in reflectance.chunks_exact_mut(texels) {
+        let mean = channel.iter().sum::<f64>() / texels as f64;
+        channel.iter_mut().for_each(|v| *v -= mean);
+    }
+    reflectance
+}
+
+/// The view nearest to the normal.
+fn frontal_view(btf: &Btf) -> usize {
+    let by_height = |&a: &usize, &b: &usize| btf.views[a].z.total_cmp(&btf.views[b].z).then(b.cmp(&a));
+    (0..btf.views.len()).max_by(by_height).unwrap_or(0)
+}
+
 /// The angular frequency, 0 where its sign is not known: at half the sampling rate.
 fn derivative(k: usize, n: usize) -> f64 {
     if 2 * k == n { 0.0 } else { frequency(k, n) }
@@ -43,8 +77,7 @@ fn derivative(k: usize, n: usize) -> f64 {
 
 /// Slopes of each texel along x and down the rows.
 fn slopes(btf: &Btf) -> Vec<[f64; 2]> {
-    let frontal = (0..btf.views.len()).max_by(|&a, &b| btf.views[a].z.total_cmp(&btf.views[b].z).then(b.cmp(&a)));
-    let view = frontal.unwrap_or(0);
+    let view = frontal_view(btf);
     let lights: Vec<usize> = (0..btf.lights.len()).filter(|&l| btf.lights[l].z > LOWEST_LIGHT).collect();
     let slope = |texel: usize| {
         let mut seen: Vec<(f64, Vector3<f64>)> =
@@ -65,7 +98,7 @@ fn brightness(btf: &Btf, view: usize, light: usize, texel: usize) -> f64 {
 /// The normal of a Lambertian surface of that brightness under those lights; z where it cannot be told.
 fn normal(seen: &mut [(f64, Vector3<f64>)]) -> Vector3<f64> {
     seen.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let cut = (LEFT_OUT * seen.len() as f64).round() as usize;
+    let cut = (LEFT_OUT * seen.len() as f64) as usize;
     let kept = &seen[cut..seen.len() - cut];
     if kept.len() < FEWEST_LIGHTS {
         return Vector3::z();

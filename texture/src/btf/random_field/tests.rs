@@ -7,6 +7,7 @@ use crate::btf::gmrf::{Gmrf, Markov};
 use crate::btf::{Codec, CodecKind, FitOptions, Material, Synthesizer, statistics};
 use capture::btf::Encoding;
 use proptest::prelude::*;
+use std::sync::LazyLock;
 
 fn covariances(field: &[f64], size: [usize; 2]) -> ScalarCovariances {
     let zeros = || vec![0.0; field.len()];
@@ -70,7 +71,8 @@ fn colours_that_depend_on_their_neighbours_are_recovered() {
     }
     let channels = [0, 1, 2].map(|c| field.iter().map(|v| v[c]).collect());
     let model = VectorModel::estimate_with(&Covariances::of(&[channels], [size; 2]), &numbers_of(&[[1, 0]]));
-    assert!((model.coefficients[0] - truth).norm() < 0.03, "{}", model.coefficients[0]);
+    // Their standard errors are up to 1/64: the third channel varies half as much as the others.
+    assert!((model.coefficients[0] - truth).norm() < 0.05, "{}", model.coefficients[0]);
     let noise = Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, 0.5));
     assert!((model.factor - noise).norm() < 0.03, "{}", model.factor);
 }
@@ -140,9 +142,9 @@ fn pyramids_return_what_they_took_at_any_size() {
 fn a_tiled_map_repeats_or_is_cut_without_a_jump() {
     let map: Vec<f64> = (0..20 * 16).map(|i| (std::f64::consts::TAU * ((i % 20) as f64 / 5.0)).sin()).collect();
     let twice = tile::tiled(&map, [20, 16], [40, 32]);
-    assert!((0..40 * 32).all(|i| twice[i] == map[i / 40 % 16 * 20 + i % 40 % 20]));
+    assert!((0..40 * 32).all(|i| twice[i] == i / 40 % 16 * 20 + i % 40 % 20));
     // Half a wave is missing: the steps stay as small as at the steepest place of the wave and half a wave's cut.
-    let cut = tile::tiled(&map, [20, 16], [35, 16]);
+    let cut: Vec<f64> = tile::tiled(&map, [20, 16], [35, 16]).into_iter().map(|t| map[t]).collect();
     let step = |i: usize| (cut[i / 35 * 35 + (i + 1) % 35] - cut[i]).abs();
     assert!((0..cut.len()).all(|i| step(i) < 1.2), "{:?}", &cut[..35]);
 }
@@ -222,8 +224,8 @@ fn stripes_come_from_the_range_map() {
 fn files_return_what_was_written() {
     let btf = striped();
     for kind in KINDS {
-        for precision in [Precision::Full, Precision::Compact] {
-            let options = FitOptions { codec: kind, budget: Budget::Components(4), precision, seed: 1 };
+        for (precision, budget) in [(Precision::Full, Budget::Components(4)), (Precision::Compact, Budget::Auto)] {
+            let options = FitOptions { codec: kind, budget, precision, seed: 1 };
             let (material, _) = super::super::fit(btf.clone(), &options).unwrap();
             let back = Material::from_bytes(&material.to_bytes().0).unwrap();
             assert_eq!(synthesize(&material, [20, 20], (1, 1), &btf), synthesize(&back, [20, 20], (1, 1), &btf));
@@ -326,17 +328,20 @@ fn survives<C: Stored + Synthesizer>(bytes: &[u8], frame: &Frame) {
     }
 }
 
+/// A material of each kind, and the bytes of its header.
+static WHOLE: LazyLock<[(Material, usize); 3]> = LazyLock::new(|| {
+    let btf = striped();
+    KINDS.map(|kind| (fitted(&btf, kind, Budget::Components(2)).0, header_bytes(&btf)))
+});
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]
 
     #[test]
     fn damaged_files_are_refused_or_answer(changes in prop::collection::vec((0.0..1.0_f64, any::<u8>()), 1..6), end in 0.5..1.2_f64) {
-        let btf = striped();
-        for kind in KINDS {
-            let (material, _) = fitted(&btf, kind, Budget::Components(2));
-            let whole = material.to_bytes().0;
+        for (kind, (material, header)) in KINDS.into_iter().zip(WHOLE.iter()) {
             // The codec's part begins where the header ends.
-            let mut bytes = whole[header_bytes(&btf)..].to_vec();
+            let mut bytes = material.to_bytes().0[*header..].to_vec();
             for &(place, value) in &changes {
                 let place = (place * bytes.len() as f64) as usize;
                 bytes[place] = value;

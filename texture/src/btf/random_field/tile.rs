@@ -5,14 +5,15 @@
 /// Widest overlap of two copies, texels.
 const MOST_OVERLAP: usize = 16;
 
-/// The map (y, x) at another size.
-pub(super) fn tiled(map: &[f64], from: [usize; 2], to: [usize; 2]) -> Vec<f64> {
-    let wide = lay_in_rows(map, from, to[0]);
-    let high = lay_in_rows(&transposed(&wide, to[0]), [from[1], to[0]], to[1]);
-    transposed(&high, to[1])
+/// For each texel (y, x) of another size, the texel of the map it is a copy of.
+pub(super) fn tiled(map: &[f64], from: [usize; 2], to: [usize; 2]) -> Vec<usize> {
+    let wide = transposed(&lay_in_rows(map, from, to[0]), to[0]);
+    let turned: Vec<f64> = wide.iter().map(|&texel| map[texel]).collect();
+    let high = lay_in_rows(&turned, [from[1], to[0]], to[1]);
+    transposed(&high.iter().map(|&place| wide[place]).collect::<Vec<_>>(), to[1])
 }
 
-fn transposed(map: &[f64], width: usize) -> Vec<f64> {
+fn transposed<T: Copy>(map: &[T], width: usize) -> Vec<T> {
     let height = map.len() / width.max(1);
     (0..map.len()).map(|i| map[(i % height) * width + i / height]).collect()
 }
@@ -26,8 +27,8 @@ struct Row<'a> {
     overlap: usize,
 }
 
-/// Copies side by side, each `to / copies` wide.
-fn lay_in_rows(map: &[f64], size: [usize; 2], to: usize) -> Vec<f64> {
+/// Copies side by side, each `to / copies` wide: places of the map.
+fn lay_in_rows(map: &[f64], size: [usize; 2], to: usize) -> Vec<usize> {
     let copies = ((to as f64 / size[0] as f64).round() as usize).max(1);
     let edge = |copy: usize| copy * to / copies;
     let overlap = MOST_OVERLAP.min(size[0] / 2).min(to / copies);
@@ -35,7 +36,7 @@ fn lay_in_rows(map: &[f64], size: [usize; 2], to: usize) -> Vec<f64> {
     let row = |start| Row { map, size, start, overlap };
     let best = best_start(size[0], &lengths, row);
     let row = row(best);
-    let mut result = vec![0.0; to * size[1]];
+    let mut result = vec![0; to * size[1]];
     let mut at = 0;
     let before: Vec<usize> = lengths.iter().copied().cycle().skip(copies - 1).take(copies).collect();
     for (length, before) in lengths.drain(..).zip(before) {
@@ -43,7 +44,7 @@ fn lay_in_rows(map: &[f64], size: [usize; 2], to: usize) -> Vec<f64> {
         for y in 0..size[1] {
             for t in 0..length {
                 let continued = t < cut[y];
-                result[y * to + at + t] = if continued { row.value(y, before + t) } else { row.value(y, t) };
+                result[y * to + at + t] = if continued { row.place(y, before + t) } else { row.place(y, t) };
             }
         }
         at += length;
@@ -66,8 +67,12 @@ fn best_start<'a>(width: usize, lengths: &[usize], row: impl Fn(usize) -> Row<'a
 }
 
 impl Row<'_> {
+    fn place(&self, y: usize, t: usize) -> usize {
+        y * self.size[0] + (self.start + t) % self.size[0]
+    }
+
     fn value(&self, y: usize, t: usize) -> f64 {
-        self.map[y * self.size[0] + (self.start + t) % self.size[0]]
+        self.map[self.place(y, t)]
     }
 
     /// Cost, and per row the first texel of the new copy, where the old one is `length` long.
