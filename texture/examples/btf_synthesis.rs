@@ -1,7 +1,7 @@
 //! Originals beside what the random-field models make of them: per material (a folder, see `docs/btf-data.md`) three
 //! rows of light and view; original, then `gmrf`, `car2d`, `car3d`, each twice as large as the tile. Prints the
 //! statistics by which they are judged, means over 48 pairs.
-//! `btf_synthesis FILE.png GROUPS|auto DATA..`
+//! `btf_synthesis FILE.png GROUPS|1:RATIO|auto DATA[@TEXELS]..`
 
 use capture::btf::{Btf, read_folder};
 use nalgebra::Vector3;
@@ -19,18 +19,20 @@ const GAP: usize = 4;
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let [file, groups, data @ ..] = arguments.as_slice() else {
-        return Err("btf_synthesis FILE.png GROUPS|auto DATA..".into());
+        return Err("btf_synthesis FILE.png GROUPS|1:RATIO|auto DATA[@TEXELS]..".into());
     };
     let pitch = SIDE + GAP;
     let (width, height) = (pitch * (1 + KINDS.len()) - GAP, pitch * PAIRS.len() * data.len() - GAP);
     let mut sheet = image::RgbImage::from_pixel(width as u32, height as u32, image::Rgb([255; 3]));
-    let budget = match groups.parse() {
-        Ok(groups) => Budget::Components(groups),
-        Err(_) => Budget::Auto,
+    let budget = match (groups.parse(), groups.strip_prefix("1:")) {
+        (Ok(groups), _) => Budget::Components(groups),
+        (_, Some(ratio)) => Budget::Ratio(ratio.parse()?),
+        _ => Budget::Auto,
     };
     println!("material codec groups bytes ratio fit_cpu_s mean dev_ratio emd autocorr spectrum_db band_db");
     for (block, folder) in data.iter().enumerate() {
-        let btf = texture::btf::to_coded_range(read_folder(Path::new(folder), None)?);
+        let (folder, crop) = folder.split_once('@').map_or((folder.as_str(), None), |(f, n)| (f, n.parse().ok()));
+        let btf = texture::btf::to_coded_range(read_folder(Path::new(folder), crop)?);
         for (row, (view, light)) in PAIRS.into_iter().enumerate() {
             let y = (block * PAIRS.len() + row) * pitch;
             paste(&mut sheet, btf.picture(view, light), [btf.width, btf.height], [0, y]);

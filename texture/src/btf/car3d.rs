@@ -19,7 +19,7 @@ use super::random_field::autoregression::{
 use super::random_field::decorrelated::{mask, neighbours, running_counts};
 use super::random_field::fourier::Wave;
 use super::random_field::numbers::{Numbers, Width};
-use super::random_field::{self, FieldModel, RandomField};
+use super::random_field::{self, BandFilter, FieldModel, RandomField};
 use super::{FitReport, Frame, Precision, Synthesizer};
 use crate::TextureError;
 use capture::btf::Btf;
@@ -150,7 +150,7 @@ impl FieldModel for Coloured {
         }
     }
 
-    fn filter(&self, band: usize) -> Box<dyn Fn(&Wave) -> Matrix3<Complex64> + Send + Sync> {
+    fn filter(&self, band: usize) -> BandFilter {
         let starts = running_counts(&self.masks);
         let (factors, coefficients) = (self.factors.values(), self.coefficients.values());
         let matrices = coefficients[9 * starts[band]..9 * starts[band + 1]].chunks_exact(9);

@@ -3,10 +3,10 @@
 
 use super::super::Precision;
 use super::super::container::{Fault, Reader, Writer};
-use super::FieldModel;
 use super::autoregression::{Covariances, NEIGHBOURS, Scalar, ScalarModel, estimate};
 use super::fourier::Wave;
 use super::numbers::{Numbers, Width};
+use super::{BandFilter, FieldModel};
 use nalgebra::{Matrix3, Vector3};
 use rustfft::num_complex::Complex64;
 use std::marker::PhantomData;
@@ -47,7 +47,7 @@ impl<M: ScalarModel> FieldModel for Decorrelated<M> {
         }
     }
 
-    fn filter(&self, band: usize) -> Box<dyn Fn(&Wave) -> Matrix3<Complex64> + Send + Sync> {
+    fn filter(&self, band: usize) -> BandFilter {
         let axes = Matrix3::from_iterator(self.axes.values());
         let (sigmas, coefficients) = (self.sigmas.values(), self.coefficients.values());
         let starts: Vec<usize> = running_counts(&self.masks);

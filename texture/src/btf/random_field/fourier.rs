@@ -15,8 +15,8 @@ pub(in super::super) struct Fourier {
 /// Powers of `e^(−iω)` at one frequency: what a shift of the field multiplies its transform by.
 pub(in super::super) struct Wave {
     /// `e^(−iω_x n)` for n = 0, 1, …
-    x: [Complex64; Wave::REACH + 1],
-    y: [Complex64; Wave::REACH + 1],
+    x: [Complex64; Self::REACH + 1],
+    y: [Complex64; Self::REACH + 1],
 }
 
 impl Fourier {

@@ -114,14 +114,17 @@ pub struct Options {
     pub seed: u64,
 }
 
+/// What three white noises are multiplied by at a frequency, to be the three channels of a band.
+pub(super) type BandFilter = Box<dyn Fn(&Wave) -> Matrix3<Complex64> + Send + Sync>;
+
 /// The model of a group's texture, in all bands.
 pub(super) trait FieldModel: Clone + std::fmt::Debug + PartialEq + Send + Sync + Sized {
     /// From the autocovariances of each band, finest first.
     fn estimate(bands: &[Covariances], precision: Precision) -> Self;
 
-    /// What three white noises are multiplied by at a frequency, to be the three channels of a band; 0 where the
-    /// model has no field. Never larger than what it was read from times 10².
-    fn filter(&self, band: usize) -> Box<dyn Fn(&Wave) -> Matrix3<Complex64> + Send + Sync>;
+    /// The filter of a band; 0 where the model has no field, and never larger than 10² times the noise it was read
+    /// with.
+    fn filter(&self, band: usize) -> BandFilter;
 
     fn write(&self, out: &mut Writer);
 

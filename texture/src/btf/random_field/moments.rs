@@ -29,7 +29,7 @@ impl Moments {
     pub(super) fn of(btf: &Btf, rank: usize, precision: Precision) -> Self {
         let (views, columns) = (btf.views.len(), MOMENTS * btf.lights.len());
         let pictures = btf.samples.chunks_exact(3 * btf.texels());
-        let moments: Vec<f64> = pictures.flat_map(|p| moments_of(p)).collect();
+        let moments: Vec<f64> = pictures.flat_map(moments_of).collect();
         let matrix = DMatrix::from_row_slice(views, columns, &moments);
         let eigen = (&matrix * matrix.transpose()).symmetric_eigen();
         let mut order: Vec<usize> = (0..views).collect();

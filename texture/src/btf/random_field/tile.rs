@@ -57,7 +57,7 @@ fn best_start<'a>(width: usize, lengths: &[usize], row: impl Fn(usize) -> Row<'a
     let mut distinct = lengths.to_vec();
     distinct.sort_unstable();
     distinct.dedup();
-    distinct.retain(|length| length % width != 0);
+    distinct.retain(|length| !length.is_multiple_of(width));
     if distinct.is_empty() {
         return 0;
     }
@@ -78,7 +78,7 @@ impl Row<'_> {
     /// Cost, and per row the first texel of the new copy, where the old one is `length` long.
     fn cut(&self, length: usize) -> (f64, Vec<usize>) {
         let [width, height] = self.size;
-        if length % width == 0 || self.overlap == 0 {
+        if length.is_multiple_of(width) || self.overlap == 0 {
             return (0.0, vec![0; height]);
         }
         let difference = |y: usize, t: usize| (self.value(y, length + t) - self.value(y, t)).powi(2);
