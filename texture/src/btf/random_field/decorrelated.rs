@@ -4,11 +4,9 @@
 use super::super::Precision;
 use super::super::container::{Fault, Reader, Writer};
 use super::autoregression::{Covariances, NEIGHBOURS, Scalar, ScalarModel, estimate};
-use super::fourier::Wave;
 use super::numbers::{Numbers, Width};
 use super::{BandFilter, FieldModel};
 use nalgebra::{Matrix3, Vector3};
-use rustfft::num_complex::Complex64;
 use std::marker::PhantomData;
 
 /// Which way each axis points, so that one noise means the same in all groups: light, warm, green.
