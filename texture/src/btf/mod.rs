@@ -32,7 +32,9 @@ pub mod multilevel_vq;
 pub mod pca;
 pub mod pca_view;
 pub mod ptm;
+mod random_field;
 mod score;
+pub mod statistics;
 
 pub use container::Part;
 pub use frame::{Blend, DirectionSet, Frame};
