@@ -97,11 +97,6 @@ impl Source {
         Self { mean, centred: data, principal }
     }
 
-    /// ‖data − mean‖² and the energies of its components.
-    pub(super) fn energies(&self) -> (f64, &[f64]) {
-        (self.principal.total, &self.principal.energy)
-    }
-
     fn samples(&self) -> f64 {
         (self.centred.len()).max(1) as f64
     }

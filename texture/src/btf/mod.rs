@@ -30,6 +30,7 @@ pub mod gmrf;
 pub mod lafortune;
 mod linear;
 pub mod local_pca;
+mod lookup;
 pub mod multilevel_vq;
 pub mod pca;
 pub mod pca_view;
