@@ -247,7 +247,8 @@ impl DirectionComplex {
 
     /// At least the simplices that some direction within `radius` of unit `centre` finds.
     pub(crate) fn candidates(&self, centre: &Vector3<f64>, radius: f64) -> Candidates {
-        let meets = |inverse: &Matrix3<f64>| inverse.row_iter().all(|row| (row * centre).x >= -row.norm() * radius - 1e-9);
+        let meets =
+            |inverse: &Matrix3<f64>| inverse.row_iter().all(|row| (row * centre).x >= -row.norm() * radius - 1e-9);
         let of_site = |s: &Vector3<f64>| angle(s, centre);
         let of_edge = |&[i, j]: &[u32; 2]| {
             let (a, b) = (self.sites[i as usize], self.sites[j as usize]);
@@ -294,12 +295,7 @@ impl DirectionComplex {
     }
 
     /// The nearest point of the edges, and of the sites that no simplex holds.
-    fn nearest(
-        &self,
-        d: &Vector3<f64>,
-        sites: impl Iterator<Item = u32>,
-        edges: impl Iterator<Item = u32>,
-    ) -> Blend {
+    fn nearest(&self, d: &Vector3<f64>, sites: impl Iterator<Item = u32>, edges: impl Iterator<Item = u32>) -> Blend {
         let mut best = (f64::NEG_INFINITY, Blend::site(0));
         for i in sites {
             let cosine = self.sites[i as usize].dot(d);

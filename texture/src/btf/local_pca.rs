@@ -108,9 +108,7 @@ pub fn fit(btf: &Btf, options: &Options) -> Result<(LocalPca, FitReport), Textur
     let clusters = match target {
         Target::Bytes(bytes) => best_clusters(&sketch, bytes, length, options.seed),
         Target::Each(components) => cluster(&sketch, STANDARD_CLUSTERS, components.min(SKETCH / 2), options.seed),
-        Target::Error(_) | Target::Supported => {
-            cluster(&sketch, STANDARD_CLUSTERS, STANDARD_COMPONENTS, options.seed)
-        }
+        Target::Error(_) | Target::Supported => cluster(&sketch, STANDARD_CLUSTERS, STANDARD_COMPONENTS, options.seed),
     };
     let members = members_of(&clusters.labels);
     let places = places_of(&members, texels);

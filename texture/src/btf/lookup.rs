@@ -49,9 +49,7 @@ fn direction(x: f64, y: f64) -> Vector3<f64> {
 }
 
 fn candidates(complex: &DirectionComplex, column: usize, row: usize) -> Candidates {
-    let at = |column: f64, row: f64| {
-        direction(column * 2.0 / SIDE as f64 - 1.0, row * 2.0 / SIDE as f64 - 1.0)
-    };
+    let at = |column: f64, row: f64| direction(column * 2.0 / SIDE as f64 - 1.0, row * 2.0 / SIDE as f64 - 1.0);
     let (x, y) = (column as f64, row as f64);
     let centre = at(x + 0.5, y + 0.5);
     let corners = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)];

@@ -104,7 +104,7 @@ impl Lights {
         let (axis, n) = (lobe.axis, lobe.exponent);
         for i in 0..values.len() {
             let cosine = axis.x * self.x[i] + axis.y * self.y[i] + axis.z * self.z[i];
-            let inside = cosine.max(EDGE).min(1.0);
+            let inside = cosine.clamp(EDGE, 1.0);
             let log = log2(inside);
             let power = exp2(n * log);
             let within = if cosine > EDGE { 1.0 } else { 0.0 };
@@ -220,7 +220,7 @@ pub(super) fn log2(x: f32) -> f32 {
 pub(super) fn exp2(x: f32) -> f32 {
     /// Added, it rounds to the nearest integer, which then stands in the lowest bits.
     const ROUNDER: f32 = 12_582_912.0;
-    let x = x.max(-126.0).min(126.0);
+    let x = x.clamp(-126.0, 126.0);
     let rounded = x + ROUNDER;
     let f = (x - (rounded - ROUNDER)) * std::f32::consts::LN_2;
     let series = 1.0 + f * (1.0 + f * (0.5 + f * (1.0 / 6.0 + f * (1.0 / 24.0 + f * (1.0 / 120.0 + f / 720.0)))));
@@ -250,7 +250,9 @@ mod tests {
     #[test]
     fn a_lobe_is_recovered() {
         let lights = Lights::new(&bonn_directions());
-        for (exponent, x, y) in [(1.0, 0.0, 0.0), (0.5, 0.3, -0.2), (6.0, -0.5, 0.1), (25.0, 0.2, 0.4), (60.0, 0.1, 0.02)] {
+        for (exponent, x, y) in
+            [(1.0, 0.0, 0.0), (0.5, 0.3, -0.2), (6.0, -0.5, 0.1), (25.0, 0.2, 0.4), (60.0, 0.1, 0.02)]
+        {
             let axis = Vector3::new(x, y, 1.0f32).normalize();
             let truth = Lobe { rho: 0.7, axis, exponent };
             let values = shown(&truth);

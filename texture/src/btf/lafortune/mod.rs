@@ -268,8 +268,7 @@ impl Polynomial {
 
 impl View {
     fn new(lobes: Rows, ranges: Rows, nodes: Rows) -> Self {
-        let polynomials =
-            (0..ranges.length()).map(|p| Polynomial::new(ranges.element(p), nodes.element(p))).collect();
+        let polynomials = (0..ranges.length()).map(|p| Polynomial::new(ranges.element(p), nodes.element(p))).collect();
         Self { lobes, ranges, nodes, polynomials }
     }
 
