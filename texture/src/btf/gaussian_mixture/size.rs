@@ -25,6 +25,8 @@ pub(super) const MOST: usize = 4096;
 const LADDER: [usize; 8] = [1, 16, 32, 64, 128, 256, 512, 1024];
 /// Share of the error that a step of the ladder has to save.
 const WORTHWHILE: f64 = 0.02;
+/// The error of rounding to 8 bits, as the mean picture is: below it nothing is left to gain.
+const ENOUGH: f64 = 0.3 / 255.0;
 /// Samples of a trial fit, and of its judgement.
 const TRIAL_SAMPLES: usize = 1_500_000;
 /// Rounds of a trial fit.
@@ -89,8 +91,7 @@ pub(super) fn supported(grid: &Grid<'_>, pairs: &[u32], options: &Options) -> (u
         components.iter_mut().zip(refitted).for_each(|(c, colour)| c.mean[6..].copy_from_slice(&colour));
         let error = mean_square_error(grid, &Packed::new(&components), &judging).sqrt();
         tried.push(format!("{count}: {:.3}", 255.0 * error));
-        // Below a hundredth of a step of 8 bits there is nothing left to gain.
-        if error > best.1 * (1.0 - WORTHWHILE) || best.1 < 0.01 / 255.0 {
+        if error > best.1 * (1.0 - WORTHWHILE) || best.1 < ENOUGH {
             break;
         }
         best = (count, error);
