@@ -58,11 +58,30 @@ pub(super) fn add_all(to: &mut [f64], from: &[f64]) {
     to.iter_mut().zip(from).for_each(|(a, b)| *a += b);
 }
 
-/// One expectation step over the pictures of `pairs`.
-pub(super) fn expect(grid: &Grid<'_>, mixture: &Packed, pairs: &[u32], reach: f32) -> Statistics {
+/// Which samples an expectation step goes over.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Extent<'a> {
+    /// Of these pictures
+    pub(super) pairs: &'a [u32],
+    /// this share of the tiles, spread evenly: few of each picture rather than few pictures, for components
+    /// would settle between the directions of those.
+    pub(super) share: f64,
+}
+
+impl Extent<'_> {
+    fn has(&self, number: usize) -> bool {
+        /// The golden ratio less 1: its multiples are spread evenly.
+        const GOLDEN: f64 = 0.618_033_988_749_894_9;
+        self.share >= 1.0 || (number as f64 * GOLDEN).fract() < self.share
+    }
+}
+
+/// One expectation step.
+pub(super) fn expect(grid: &Grid<'_>, mixture: &Packed, extent: Extent<'_>, reach: f32) -> Statistics {
+    let pairs = extent.pairs;
     let part = |pairs: &[u32]| {
         let mut statistics = Statistics::none(grid, mixture.count);
-        run(grid, mixture, pairs, reach, &mut statistics);
+        run(grid, mixture, Extent { pairs, ..extent }, reach, &mut statistics);
         statistics
     };
     let parts: Vec<Statistics> = pairs.par_chunks(pairs.len().div_ceil(PARTS).max(1)).map(part).collect();
@@ -72,26 +91,28 @@ pub(super) fn expect(grid: &Grid<'_>, mixture: &Packed, pairs: &[u32], reach: f3
 }
 
 kernel! {
-    /// Adds the pictures of `pairs` to the statistics.
-    fn run(grid: &Grid<'_>, mixture: &Packed, pairs: &[u32], reach: f32, to: &mut Statistics) = expect_with
+    /// Adds samples to the statistics.
+    fn run(grid: &Grid<'_>, mixture: &Packed, extent: Extent<'_>, reach: f32, to: &mut Statistics) = expect_with
 }
 
 #[inline(always)]
 pub(super) fn expect_with<V: Vector>(
     grid: &Grid<'_>,
     mixture: &Packed,
-    pairs: &[u32],
+    extent: Extent<'_>,
     reach: f32,
     to: &mut Statistics,
 ) {
     let mut tiles = Tile::all(&grid.x, &grid.y);
     let mut likely = Likely::default();
     let (mut energy, mut sums) = (Vec::new(), vec![[[0.0; LANES]; SUMS]; mixture.count]);
-    for &pair in pairs {
+    for &pair in extent.pairs {
         let pair = pair as usize;
         mixture.energies::<V>(&mixture.joint, 2, &grid.angles(pair), &mut energy);
         let (picture, mean) = (grid.picture(pair), grid.mean_colour(pair));
-        for tile in &mut tiles {
+        let first = pair * tiles.len();
+        for (_, tile) in tiles.iter_mut().enumerate().filter(|(k, _)| extent.has(first + k)) {
+            to.samples += (tile.rows * tile.columns) as f64;
             tile.take_colours(picture, grid.x.len(), mean);
             likely.find::<V>(mixture, &energy, tile, true, reach);
             to.evaluations += (likely.list.len() * tile.rows * tile.columns) as f64;
@@ -101,7 +122,6 @@ pub(super) fn expect_with<V: Vector>(
                 add_shares::<V>(mixture, component, &likely.total, share, tile, &mut sums[component]);
             }
         }
-        to.samples += grid.texels() as f64;
         settle::<V>(grid, pair, &mut sums, to);
     }
 }

@@ -51,17 +51,32 @@ fn moments(weights: &[f64], values: impl Iterator<Item = f32> + Clone) -> (f64, 
     (mean, square.sqrt())
 }
 
+/// Which inputs share the narrowing of components at the start: exponents of 1/M, which sum to 1.
+pub(super) type Shape = [f64; INPUTS];
+
+/// Even; narrow in place alone; in place and light; in place and eye; columns and rows under an eye. EM
+/// stays near the shape it starts with, and which one serves depends on what varies fastest.
+pub(super) const SHAPES: [Shape; 6] = [
+    [1.0 / 6.0; INPUTS],
+    [0.5, 0.5, 0.0, 0.0, 0.0, 0.0],
+    [0.25, 0.25, 0.25, 0.25, 0.0, 0.0],
+    [0.25, 0.25, 0.0, 0.0, 0.25, 0.25],
+    [0.5, 0.0, 0.0, 0.0, 0.25, 0.25],
+    [0.0, 0.5, 0.0, 0.0, 0.25, 0.25],
+];
+
 /// Components on samples spread evenly over texels, lights and views, as wide as their share of the inputs' volume.
 pub(super) fn start(
     grid: &Grid<'_>,
     pairs: &[u32],
     count: usize,
+    shape: &Shape,
     floors: &[f64; VARIABLES],
     seed: u64,
 ) -> Vec<Component> {
     let spread = spread(grid, pairs);
-    let narrower = (count as f64).powf(-1.0 / INPUTS as f64);
-    let sigma = std::array::from_fn(|v| (if v < INPUTS { narrower } else { 1.0 } * spread[v]).max(floors[v]));
+    let narrowing = |v: usize| if v < INPUTS { (count as f64).powf(-shape[v]) } else { 1.0 };
+    let sigma = std::array::from_fn(|v| (narrowing(v) * spread[v]).max(floors[v]));
     let (width, height) = (grid.x.len(), grid.y.len());
     let component = |k: usize| {
         let [at_x, at_y, at_pair] = even_point(k, seed);

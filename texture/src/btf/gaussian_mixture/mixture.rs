@@ -183,7 +183,7 @@ impl Likely {
         }
         let limit = self.lowest_best::<V>(tile.rows) - reach;
         self.look_at::<V>(mixture, energy, tile, evidence, [limit, above]);
-        self.to_shares::<V>(tile.rows);
+        self.share_out::<V>(tile.rows);
     }
 
     /// Bounds all components over the tile; the largest bound.
@@ -272,7 +272,7 @@ impl Likely {
 
     /// Logarithms become shares of the best.
     #[inline(always)]
-    fn to_shares<V: Vector>(&mut self, rows: usize) {
+    fn share_out<V: Vector>(&mut self, rows: usize) {
         self.total = [[0.0; LANES]; ROWS];
         for share in &mut self.shares[..self.list.len()] {
             for row in 0..rows {

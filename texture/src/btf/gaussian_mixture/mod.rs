@@ -8,7 +8,8 @@
 //! | parameter | what it does |
 //! |---|---|
 //! | `components` | M, ½ KiB of a file for 7 (full) or 20 (compact); none: found by held-out pairs ([`size`]) |
-//! | `rounds`, `warm_up` | of EM; the first on a share of the pictures |
+//! | `rounds`, `warm_up` | of EM; the first on a share of the samples |
+//! | `try_shapes` | components start narrow in what varies fastest |
 //! | `reach` | components whose log density is this far below the best at all texels of a tile are left out |
 //! | `refit` | colours by least squares after EM: same bytes, smaller error |
 //!
@@ -49,7 +50,7 @@ use capture::btf::Btf;
 use estimation::{Estimate, estimate};
 use mixture::{Component, Packed};
 use nalgebra::Vector3;
-use variables::{FLOORS, Grid, INPUTS, onion_slice};
+use variables::{FLOORS, Grid, onion_slice};
 
 /// Samples beyond this were not encoded.
 const LARGEST_SAMPLE: f32 = 100.0;
@@ -63,8 +64,10 @@ pub struct Options {
     pub precision: Precision,
     /// Rounds of EM, unless it converges earlier.
     pub rounds: usize,
-    /// The first rounds may use fewer pictures.
+    /// The first rounds may use fewer samples.
     pub warm_up: Option<WarmUp>,
+    /// Whether components start in the one of six shapes with which a short fit answers best; otherwise evenly narrow.
+    pub try_shapes: bool,
     /// Components are left out of a tile where their log density is this far below the best of every texel.
     pub reach: f32,
     /// Whether colours are fitted by least squares afterwards.
@@ -73,10 +76,10 @@ pub struct Options {
     pub seed: u64,
 }
 
-/// Rounds on few pictures.
+/// Rounds on a share of the samples.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WarmUp {
-    /// Of all pictures; more are used where a component would have few samples.
+    /// Of all samples; more are used where a component would have few.
     pub share: f64,
     /// How many rounds.
     pub rounds: usize,
@@ -91,7 +94,7 @@ pub struct GaussianMixture {
     mean: Vec<u8>,
     components: Vec<Component>,
     /// The components, ready to be evaluated.
-    packed: Packed,
+    packed: Box<Packed>,
 }
 
 impl Options {
@@ -106,6 +109,7 @@ impl Options {
             precision,
             rounds: 40,
             warm_up: Some(WarmUp { share: 0.04, rounds: 14 }),
+            try_shapes: true,
             reach: 14.0,
             refit: true,
             seed,
@@ -132,11 +136,8 @@ pub fn fit(btf: &Btf, options: &Options) -> Result<(GaussianMixture, FitReport),
     let mut components: Vec<Component> =
         found.components.iter().map(|c| storage::rounded(c, options.precision, &frame)).collect();
     if options.refit {
-        let colours = refit::colours(&grid, &Packed::new(&components), &pairs);
-        for (component, colour) in components.iter_mut().zip(colours) {
-            component.mean[INPUTS..].copy_from_slice(&colour);
-            *component = storage::rounded(component, options.precision, &frame);
-        }
+        components = refit::refitted(&grid, components, &pairs);
+        components.iter_mut().for_each(|c| *c = storage::rounded(c, options.precision, &frame));
     }
     let codec = GaussianMixture::new(frame, options.precision, grid.mean, components);
     Ok((codec, FitReport { objective: found.log_likelihood, notes }))
@@ -148,14 +149,14 @@ fn check(btf: &Btf, options: &Options) -> Result<(), TextureError> {
         let fault = format!("{} samples for {} pairs of {} texels", btf.samples.len(), btf.pairs(), btf.texels());
         return refuse(fault, "give one picture of equal size per pair of view and light");
     }
-    if let Some(sample) = btf.samples.iter().find(|s| !(s.abs() <= LARGEST_SAMPLE)) {
+    if let Some(sample) = btf.samples.iter().find(|s| !s.is_finite() || s.abs() > LARGEST_SAMPLE) {
         return refuse(format!("a sample is {sample}"), "fill holes by Btf::check, and encode a high range as Log");
     }
     if options.components.is_some_and(|count| !(1..=size::MOST).contains(&count)) || options.rounds == 0 {
         let fault = format!("{:?} components in {} rounds were asked for", options.components, options.rounds);
         return refuse(fault, "ask for 1 to 4096 components and at least 1 round");
     }
-    if !(options.reach > 0.0) {
+    if options.reach.is_nan() || options.reach <= 0.0 {
         return refuse(format!("a reach of {} was asked for", options.reach), "14 changes sums by less than 0.1 %");
     }
     Ok(())
@@ -181,6 +182,7 @@ fn describe(found: &Estimate, asked: usize, options: &Options, notes: &mut Vec<S
     if found.reseeded > 0 {
         notes.push(format!("components were empty {} times, and put elsewhere", found.reseeded));
     }
+    notes.push(format!("components started as narrow as M to the power of minus {:.2?}", found.shape));
     let bound = count as f64 * f64::from(-options.reach).exp();
     notes.push(format!(
         "{:.2} % of densities were evaluated, which changes sums by at most {:.4} %",
@@ -191,7 +193,7 @@ fn describe(found: &Estimate, asked: usize, options: &Options, notes: &mut Vec<S
 
 impl GaussianMixture {
     fn new(frame: Frame, precision: Precision, mean: Vec<u8>, components: Vec<Component>) -> Self {
-        let packed = Packed::new(&components);
+        let packed = Box::new(Packed::new(&components));
         Self { frame, precision, mean, components, packed }
     }
 

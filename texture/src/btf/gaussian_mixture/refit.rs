@@ -7,15 +7,15 @@
 
 use super::expectation::add_all;
 use super::lanes::{LANES, Row, Vector, kernel};
-use super::mixture::{Likely, Packed, ROWS, Tile};
+use super::mixture::{Component, Likely, Packed, ROWS, Tile};
 use super::prediction::REACH;
-use super::variables::{Grid, INPUTS};
+use super::variables::{Grid, INPUTS, VARIABLES};
 use rayon::prelude::*;
 
 /// Parts the pictures are dealt into; each holds a matrix.
 const PARTS: usize = 4;
 /// Of the mean of the diagonal, put upon it.
-const RIDGE: f64 = 1e-6;
+const RIDGE: f64 = 1e-5;
 /// Rounds of conjugate gradients at most.
 const ROUNDS: usize = 500;
 /// Rows of the product computed together.
@@ -202,12 +202,13 @@ impl BySample {
     }
 }
 
-/// The mixture's colours, refitted to the pictures of `pairs`: per component.
-pub(super) fn colours(grid: &Grid<'_>, mixture: &Packed, pairs: &[u32]) -> Vec<[f64; 3]> {
-    let normal = Normal::of(grid, mixture, pairs);
-    let solved = [0, 1, 2].map(|c| {
-        let guess: Vec<f64> = mixture.mean[INPUTS + c][..mixture.count].iter().map(|&v| f64::from(v)).collect();
-        normal.solve(c, &guess)
-    });
-    (0..mixture.count).map(|m| [solved[0][m], solved[1][m], solved[2][m]]).collect()
+/// The components with colours refitted to the pictures of `pairs`.
+pub(super) fn refitted(grid: &Grid<'_>, mut components: Vec<Component>, pairs: &[u32]) -> Vec<Component> {
+    let normal = Normal::of(grid, &Packed::new(&components), pairs);
+    for variable in INPUTS..VARIABLES {
+        let guess: Vec<f64> = components.iter().map(|c| c.mean[variable]).collect();
+        let solved = normal.solve(variable - INPUTS, &guess);
+        components.iter_mut().zip(solved).for_each(|(c, colour)| c.mean[variable] = colour);
+    }
+    components
 }

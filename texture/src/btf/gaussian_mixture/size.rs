@@ -5,7 +5,7 @@
 //! is for is to answer where it was not fitted: every eighth pair of light and view is held out, short fits on
 //! others grow by doubling, and growing ends where the error of the pairs held out no longer falls by 2 %.
 
-use super::estimation::{Estimate, estimate};
+use super::estimation::estimate;
 use super::mixture::Packed;
 use super::prediction::mean_square_error;
 use super::storage::{component_bytes, other_bytes};
@@ -81,15 +81,14 @@ pub(super) fn supported(grid: &Grid<'_>, pairs: &[u32], options: &Options) -> (u
     let share = |count: usize| TRIAL_SAMPLES as f64 / (count * grid.texels()) as f64;
     let training = evenly(&training, share(training.len()));
     let judging = evenly(&judging, share(judging.len()));
-    let trial = Options { rounds: TRIAL_ROUNDS, warm_up: None, ..*options };
+    let trial = Options { rounds: TRIAL_ROUNDS, warm_up: None, try_shapes: false, ..*options };
     let samples = training.len() * grid.texels();
     let mut best = (1, f64::INFINITY);
     let mut tried = Vec::new();
     for count in LADDER.into_iter().filter(|&count| count == 1 || 20 * count <= samples) {
-        let Estimate { mut components, .. } = estimate(grid, &training, count, &trial);
-        let refitted = refit::colours(grid, &Packed::new(&components), &training);
-        components.iter_mut().zip(refitted).for_each(|(c, colour)| c.mean[6..].copy_from_slice(&colour));
-        let error = mean_square_error(grid, &Packed::new(&components), &judging).sqrt();
+        let components = estimate(grid, &training, count, &trial).components;
+        let refitted = refit::refitted(grid, components, &training);
+        let error = mean_square_error(grid, &Packed::new(&refitted), &judging).sqrt();
         tried.push(format!("{count}: {:.3}", 255.0 * error));
         if error > best.1 * (1.0 - WORTHWHILE) || best.1 < ENOUGH {
             break;

@@ -21,7 +21,7 @@ use std::f64::consts::FRAC_PI_2;
 /// Logarithm of the smallest weight.
 pub(super) const LEAST_LOG_WEIGHT: f64 = -20.0;
 /// Colours less the mean are coded between plus and minus this: least squares may overshoot what was measured.
-const COLOUR_RANGE: f64 = 4.0;
+const COLOUR_RANGE: f64 = 8.0;
 /// What the deviations of colours are where no file holds them.
 const UNKNOWN_SIGMA: f64 = 1.0;
 /// Numbers of a full file are within this, and deviations above its inverse.

@@ -1,8 +1,8 @@
 //! Known answers, plain EM in `f64` as the reference, and what awkward data are answered with.
 
-use super::expectation::{Statistics, expect, expect_with};
+use super::expectation::{Extent, Statistics, expect, expect_with};
 use super::lanes::{LANES, Plain, Row, Vector};
-use super::maximization::{maximise, reseed, spread, start};
+use super::maximization::{SHAPES, maximise, reseed, spread, start};
 use super::mixture::{Component, Packed};
 use super::variables::{FLOORS, Grid, INPUTS, VARIABLES, onion_slice};
 use super::*;
@@ -145,6 +145,10 @@ fn four_numbers() -> (Grid<'static>, Vec<Component>, [f64; VARIABLES]) {
     (grid, vec![at(0.0), at(10.0)], floors)
 }
 
+fn all(pairs: &[u32]) -> Extent<'_> {
+    Extent { pairs, share: 1.0 }
+}
+
 fn likelihood(found: &Statistics) -> f64 {
     found.log_likelihood / found.samples
 }
@@ -174,9 +178,9 @@ fn one_round_on_four_numbers_is_the_known_one() {
     let samples = all_samples(&grid, &[0]);
     let (plain_before, plain) = plain_round(&samples, &start, &floors);
     let (plain_after, _) = plain_round(&samples, &plain, &floors);
-    let found = expect(&grid, &Packed::new(&start), &[0], ALL);
+    let found = expect(&grid, &Packed::new(&start), all(&[0]), ALL);
     let fast = maximise(&grid, &start, &found, &floors);
-    let after = likelihood(&expect(&grid, &Packed::new(&fast), &[0], ALL));
+    let after = likelihood(&expect(&grid, &Packed::new(&fast), all(&[0]), ALL));
     for (before, after, new) in [(plain_before, plain_after, plain), (likelihood(&found), after, fast)] {
         assert!((before + 1.862_085_7).abs() < 1e-6 && (after + 1.418_938_5).abs() < 1e-6, "{before} {after}");
         for (component, mean) in new.iter().zip([0.5, 9.5]) {
@@ -191,9 +195,9 @@ fn the_fast_round_is_the_plain_one() {
     let btf = striped();
     let (grid, pairs) = (Grid::of(&btf), all_pairs(&btf));
     let samples = all_samples(&grid, &pairs);
-    let mut components = start(&grid, &pairs, 7, &FLOORS, 3);
+    let mut components = start(&grid, &pairs, 7, &SHAPES[0], &FLOORS, 3);
     for _ in 0..4 {
-        let found = expect(&grid, &Packed::new(&components), &pairs, ALL);
+        let found = expect(&grid, &Packed::new(&components), all(&pairs), ALL);
         let fast = maximise(&grid, &components, &found, &FLOORS);
         let (expected, plain) = plain_round(&samples, &components, &FLOORS);
         assert!((likelihood(&found) - expected).abs() < 1e-5, "{} {expected}", likelihood(&found));
@@ -213,11 +217,11 @@ fn leaving_components_out_costs_less_than_a_thousandth_of_the_likelihood() {
     let btf = striped();
     let (grid, pairs) = (Grid::of(&btf), all_pairs(&btf));
     let samples = all_samples(&grid, &pairs);
-    let mut fast = start(&grid, &pairs, 40, &FLOORS, 3);
+    let mut fast = start(&grid, &pairs, 40, &SHAPES[0], &FLOORS, 3);
     let mut plain = fast.clone();
     let mut evaluations = 0.0;
     for _ in 0..12 {
-        let found = expect(&grid, &Packed::new(&fast), &pairs, 14.0);
+        let found = expect(&grid, &Packed::new(&fast), all(&pairs), 14.0);
         evaluations = found.evaluations / found.samples;
         fast = maximise(&grid, &fast, &found, &FLOORS);
         plain = plain_round(&samples, &plain, &FLOORS).1;
@@ -233,10 +237,10 @@ fn the_likelihood_never_falls() {
     let (grid, pairs) = (Grid::of(&btf), all_pairs(&btf));
     // Floors are no maximum of the likelihood: without them.
     let floors = [1e-3; VARIABLES];
-    let mut components = start(&grid, &pairs, 5, &floors, 1);
+    let mut components = start(&grid, &pairs, 5, &SHAPES[0], &floors, 1);
     let mut before = f64::NEG_INFINITY;
     for _ in 0..10 {
-        let found = expect(&grid, &Packed::new(&components), &pairs, ALL);
+        let found = expect(&grid, &Packed::new(&components), all(&pairs), ALL);
         assert!(likelihood(&found) >= before - 1e-6, "{before} {}", likelihood(&found));
         before = likelihood(&found);
         components = maximise(&grid, &components, &found, &floors);
@@ -329,6 +333,14 @@ fn least_squares_lowers_the_error() {
 }
 
 #[test]
+fn tried_shapes_answer_no_worse() {
+    let btf = striped();
+    let tried = fit(&btf, &Options { try_shapes: true, ..options(40, Precision::Full) }).unwrap().0;
+    let (even, tried) = (rmse(&btf, &fitted(&btf, 40, Precision::Full)), rmse(&btf, &tried));
+    assert!(tried < 1.02 * even, "{even} {tried}");
+}
+
+#[test]
 fn compact_numbers_cost_next_to_nothing() {
     let btf = striped();
     let [full, compact] = [Precision::Full, Precision::Compact].map(|p| fitted(&btf, 60, p));
@@ -371,7 +383,7 @@ fn empty_components_take_half_of_another() {
     let btf = striped();
     let grid = Grid::of(&btf);
     let spread = spread(&grid, &all_pairs(&btf));
-    let mut components = start(&grid, &all_pairs(&btf), 3, &FLOORS, 1);
+    let mut components = start(&grid, &all_pairs(&btf), 3, &SHAPES[0], &FLOORS, 1);
     components[1].weight = 0.0;
     assert_eq!(reseed(&mut components, 1000.0, &spread, &FLOORS), 1);
     assert!(components.iter().all(|c| c.weight > 0.2), "{components:?}");
@@ -503,11 +515,11 @@ fn exponentials_are_exact_to_a_few_units() {
 fn plain_loops_and_vector_instructions_agree() {
     let btf = striped();
     let (grid, pairs) = (Grid::of(&btf), all_pairs(&btf));
-    let components = start(&grid, &pairs, 30, &FLOORS, 3);
+    let components = start(&grid, &pairs, 30, &SHAPES[0], &FLOORS, 3);
     let packed = Packed::new(&components);
-    let fast = expect(&grid, &packed, &pairs, 14.0);
-    let mut plain = expect(&grid, &packed, &[], 14.0);
-    expect_with::<Plain>(&grid, &packed, &pairs, 14.0, &mut plain);
+    let fast = expect(&grid, &packed, all(&pairs), 14.0);
+    let mut plain = expect(&grid, &packed, all(&[]), 14.0);
+    expect_with::<Plain>(&grid, &packed, all(&pairs), 14.0, &mut plain);
     assert!((fast.log_likelihood - plain.log_likelihood).abs() < 1e-6 * plain.log_likelihood.abs());
     for (a, b) in fast.sums.iter().zip(&plain.sums) {
         assert!((a[0] - b[0]).abs() < 1e-4 * b[0] && (a[8] - b[8]).abs() < 1e-4 * b[8], "{a:?} {b:?}");
