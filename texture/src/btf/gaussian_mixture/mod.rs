@@ -7,7 +7,7 @@
 //!
 //! | parameter | what it does |
 //! |---|---|
-//! | `components` | M, ½ KiB of a file for 7 (full) or 20 (compact); none: found by held-out pairs ([`size`]) |
+//! | `components` | M, of 76 bytes each (full) or 25 (compact); none: found by pairs held out ([`size`]) |
 //! | `rounds`, `warm_up` | of EM; the first on a share of the samples |
 //! | `try_shapes` | components start narrow in what varies fastest |
 //! | `reach` | components whose log density is this far below the best at all texels of a tile are left out |
@@ -18,11 +18,13 @@
 //! vary most ([`estimation`]). The samples are a product grid: angles enter once a picture, and each tile of
 //! 16 × 8 texels knows which components can matter to it ([`mixture`]).
 //!
-//! **Cost**: samples × M × the share that is not left out, a few per cent; in memory M × (lights + views) sums
-//! for each of 32 parts. An answer: M densities of six variables, sixteen at a time.
+//! **Cost**: samples × M × the share that is not left out (half of 300, less of more) × rounds, the first third of
+//! which take 4 % of the samples; in memory M × (lights + views) sums for each of 32 parts and M² for the refit.
+//! An answer: M densities of six variables, sixteen at a time.
 //!
-//! **Limits**: highlights sharper than the components are wide are blurred; the tile does not continue across its border. What
-//! has no variation (one texel, one light, constant colour) puts deviations on their floors and changes no
+//! **Limits**: structures and highlights sharper than the components are wide are blurred, and of a tile whose
+//! texels hardly resemble their neighbours little more than the mean picture is left; the tile does not continue
+//! across its border. What has no variation (one texel, one light, constant colour) puts deviations on their floors and changes no
 //! answer. More components than samples are not made. Samples that are not finite, or far outside 0 to 1, are
 //! refused. Under a direction that is no direction, the answer is that for the normal.
 //!

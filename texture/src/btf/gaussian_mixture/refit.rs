@@ -8,10 +8,12 @@
 use super::expectation::add_all;
 use super::lanes::{LANES, Row, Vector, kernel};
 use super::mixture::{Component, Likely, Packed, ROWS, Tile};
-use super::prediction::REACH;
 use super::variables::{Grid, INPUTS, VARIABLES};
 use rayon::prelude::*;
 
+/// Components further below the best are left out of a tile: products grow with the square of their number, and
+/// these change shares by less than `M · exp(−12)`.
+const REACH: f32 = 12.0;
 /// Parts the pictures are dealt into; each holds a matrix.
 const PARTS: usize = 4;
 /// Of the mean of the diagonal, put upon it.

@@ -71,7 +71,16 @@ fn striped() -> Btf {
 }
 
 fn options(components: usize, precision: Precision) -> Options {
-    Options { components: Some(components), precision, rounds: 15, warm_up: None, reach: 14.0, refit: true, seed: 1 }
+    Options {
+        components: Some(components),
+        precision,
+        rounds: 15,
+        warm_up: None,
+        try_shapes: false,
+        reach: 14.0,
+        refit: true,
+        seed: 1,
+    }
 }
 
 fn fitted(btf: &Btf, components: usize, precision: Precision) -> GaussianMixture {
