@@ -38,7 +38,7 @@ const MAX_SIDE: usize = 1 << 14;
 pub struct Fault(pub String);
 
 /// Bytes of one part of a file.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
 pub struct Part {
     /// What it holds.
     pub name: &'static str,
