@@ -17,7 +17,10 @@ const REACH: f32 = 12.0;
 /// Parts the pictures are dealt into; each holds a matrix.
 const PARTS: usize = 4;
 /// Of the mean of the diagonal, put upon it.
-const RIDGE: f64 = 1e-5;
+const RIDGES: [f64; 5] = [1e-5, 1e-4, 1e-3, 1e-2, 0.1];
+/// Colours less the mean that leave 0 to 1 by far are differences of components that are hardly told apart: they gain
+/// nothing and do not bear rounding.
+pub(super) const LARGEST_COLOUR: f64 = 2.0;
 /// Rounds of conjugate gradients at most.
 const ROUNDS: usize = 500;
 /// Rows of the product computed together.
@@ -56,10 +59,17 @@ impl Normal {
         sum
     }
 
-    /// The colours of one channel, from a first guess.
+    /// The colours of one channel, from a first guess, with the first ridge that keeps them within bounds.
     pub(super) fn solve(&self, channel: usize, guess: &[f64]) -> Vec<f64> {
         let n = self.count;
-        let ridge = RIDGE * (0..n).map(|m| self.matrix[m * n + m]).sum::<f64>() / n as f64;
+        let diagonal = (0..n).map(|m| self.matrix[m * n + m]).sum::<f64>() / n as f64;
+        let bounded = |colours: &Vec<f64>| colours.iter().all(|c| c.abs() <= LARGEST_COLOUR);
+        let found = RIDGES.iter().map(|ridge| self.solve_with(ridge * diagonal, channel, guess)).find(bounded);
+        found.unwrap_or_else(|| guess.to_vec())
+    }
+
+    fn solve_with(&self, ridge: f64, channel: usize, guess: &[f64]) -> Vec<f64> {
+        let n = self.count;
         let (mut change, mut residual) = (vec![0.0; n], self.right[channel].clone());
         residual.iter_mut().zip(self.times(guess, 0.0)).for_each(|(r, p)| *r -= p);
         let (mut direction, mut square) = (residual.clone(), dot(&residual, &residual));

@@ -13,6 +13,7 @@
 
 use super::GaussianMixture;
 use super::mixture::Component;
+use super::refit::LARGEST_COLOUR;
 use super::variables::{INPUTS, VARIABLES};
 use crate::btf::container::{Fault, Reader, Stored, Writer};
 use crate::btf::{Frame, Precision};
@@ -20,8 +21,6 @@ use std::f64::consts::FRAC_PI_2;
 
 /// Logarithm of the smallest weight.
 pub(super) const LEAST_LOG_WEIGHT: f64 = -20.0;
-/// Colours less the mean are coded between plus and minus this: least squares may overshoot what was measured.
-const COLOUR_RANGE: f64 = 8.0;
 /// What the deviations of colours are where no file holds them.
 const UNKNOWN_SIGMA: f64 = 1.0;
 /// Numbers of a full file are within this, and deviations above its inverse.
@@ -98,7 +97,7 @@ fn scales(frame: &Frame) -> [[Scale; 2]; INPUTS] {
 }
 
 const WEIGHT: Scale = Scale { low: LEAST_LOG_WEIGHT, high: 0.0, steps: 255.0 };
-const COLOUR: Scale = Scale { low: -COLOUR_RANGE, high: COLOUR_RANGE, steps: 65535.0 };
+const COLOUR: Scale = Scale { low: -LARGEST_COLOUR, high: LARGEST_COLOUR, steps: 65535.0 };
 
 /// The component as it comes back from a file.
 pub(super) fn rounded(component: &Component, precision: Precision, frame: &Frame) -> Component {
