@@ -44,7 +44,7 @@ mod storage;
 mod tests;
 mod variables;
 
-pub use storage::{Counting, ratio_as_printed};
+pub use storage::{Counting, printed_bytes, ratio_as_printed};
 
 use super::{Budget, FitReport, Frame, Precision, Sampler};
 use crate::TextureError;

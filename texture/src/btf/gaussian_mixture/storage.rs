@@ -52,6 +52,11 @@ pub fn ratio_as_printed(raw: f64, components: usize, pairs: usize, counting: Cou
     raw / (taken + mean)
 }
 
+/// Bytes as the source counts them: 18 floats a component, without its weight, and the mean picture in bytes.
+pub fn printed_bytes(components: usize, pairs: usize) -> usize {
+    4 * 2 * VARIABLES * components + 3 * pairs
+}
+
 /// Bytes of a component.
 pub(super) fn component_bytes(precision: Precision) -> usize {
     match precision {
