@@ -1,5 +1,6 @@
 //! What every codec shares: the tile's size, and the directions it was measured under.
 
+use super::lookup::Lookup;
 use crate::directions::{DirectionComplex, Layout};
 use nalgebra::Vector3;
 use std::sync::Arc;
@@ -22,6 +23,7 @@ pub struct Frame {
 pub struct DirectionSet {
     vectors: Vec<Vector3<f64>>,
     complex: DirectionComplex,
+    lookup: Lookup,
 }
 
 /// A convex combination of up to three directions; unused entries have weight 0.
@@ -66,7 +68,8 @@ impl Frame {
 impl DirectionSet {
     /// A set of unit vectors.
     pub fn new(vectors: &[Vector3<f64>]) -> Self {
-        Self { vectors: vectors.to_vec(), complex: DirectionComplex::build(vectors, Layout::General) }
+        let complex = DirectionComplex::build(vectors, Layout::General);
+        Self { vectors: vectors.to_vec(), lookup: Lookup::new(&complex), complex }
     }
 
     /// Number of directions.
@@ -86,7 +89,7 @@ impl DirectionSet {
 
     /// The measured directions about a direction; beyond the outermost ring, the nearest point of the border.
     pub fn blend(&self, direction: &Vector3<f32>) -> Blend {
-        let blend = self.complex.blend(&direction.cast());
+        let blend = self.lookup.blend(&self.complex, &direction.cast());
         let entries = blend.map_or([(0, 1.0), (0, 0.0), (0, 0.0)], |b| b.entries.map(|(site, w)| (site, w as f32)));
         Blend { entries }
     }

@@ -27,7 +27,7 @@ const TYPICAL_RANGE: f64 = 8.0;
 /// Variance of rounding to 8 bits: below it, no component is supported by the data.
 const ROUNDING: f64 = 1.0 / (12.0 * 255.0 * 255.0);
 /// Attempts to meet a number of bytes.
-const ATTEMPTS: usize = 4;
+const ATTEMPTS: usize = 6;
 /// Most components looked for where an error or the data decide.
 const MOST: usize = 300;
 /// Fewest bits a number takes on average when a number of bytes is met.
@@ -92,14 +92,11 @@ impl Source {
         let mut sums = vec![0.0f64; length];
         data.column_iter().for_each(|column| sums.iter_mut().zip(&column).for_each(|(s, &x)| *s += f64::from(x)));
         let mean: Vec<f32> = sums.iter().map(|s| (s / count.max(1) as f64) as f32).collect();
-        data.as_mut_slice().par_chunks_mut(length.max(1)).for_each(|x| x.iter_mut().zip(&mean).for_each(|(x, m)| *x -= m));
+        data.as_mut_slice()
+            .par_chunks_mut(length.max(1))
+            .for_each(|x| x.iter_mut().zip(&mean).for_each(|(x, m)| *x -= m));
         let principal = Principal::of(&data, most, seed);
         Self { mean, centred: data, principal }
-    }
-
-    /// ‖data − mean‖² and the energies of its components.
-    pub(super) fn energies(&self) -> (f64, &[f64]) {
-        (self.principal.total, &self.principal.energy)
     }
 
     fn samples(&self) -> f64 {
@@ -188,24 +185,29 @@ pub(super) fn fit(
         let counts = ladder.counts(ladder.steps_for(sources, target), target);
         return models(&counts);
     };
+    let size = |models: &[LinearModel]| models.iter().map(LinearModel::bytes).sum::<usize>();
     let mut scale = 1.0;
-    let mut found = Vec::new();
+    let mut best: Option<Vec<LinearModel>> = None;
     for _ in 0..ATTEMPTS {
-        let fits = |steps: &usize| expected(&ladder.counts(*steps, target)) as f64 * scale <= most as f64;
-        let counts = ladder.counts(partition_point(ladder.order.len() + 1, |steps| fits(&steps)).saturating_sub(1), target);
-        found = models(&counts);
-        let bytes: usize = found.iter().map(LinearModel::bytes).sum();
-        if bytes <= most && (bytes as f64 > 0.97 * most as f64 || counts.iter().sum::<usize>() == ladder.order.len()) {
-            return found;
+        let fits = |steps| expected(&ladder.counts(steps, target)) as f64 * scale <= most as f64;
+        let steps = partition_point(ladder.order.len() + 1, fits).saturating_sub(1);
+        let counts = ladder.counts(steps, target);
+        let found = models(&counts);
+        let bytes = size(&found);
+        // A hair more, or the same components are found again.
+        scale = bytes as f64 / expected(&counts) as f64 * if bytes > most { 1.01 } else { 1.0 };
+        let is_best = bytes <= most && best.as_ref().is_none_or(|best| size(best) < bytes);
+        best = if is_best { Some(found) } else { best };
+        let is_close = bytes <= most && (bytes as f64 > 0.97 * most as f64 || steps == ladder.order.len());
+        if is_close || steps == 0 {
+            break;
         }
-        // A hair more, or the same number of components is found again.
-        scale = bytes as f64 / expected(&counts) as f64 * if bytes > most { 1.003 } else { 1.0 };
     }
-    let bytes: usize = found.iter().map(LinearModel::bytes).sum();
-    if bytes > most {
-        notes.push(format!("{most} bytes were asked for, {bytes} are needed"));
-    }
-    found
+    best.unwrap_or_else(|| {
+        let least = models(&vec![0; sources.len()]);
+        notes.push(format!("{most} bytes were asked for, {} are taken by means alone", size(&least)));
+        least
+    })
 }
 
 /// The number of leading positions below `end` that satisfy a condition which, once false, stays so.
@@ -232,7 +234,8 @@ struct Ladder {
 
 impl Ladder {
     fn of(sources: &[Source]) -> Self {
-        let of_source = |(s, source): (usize, &Source)| source.principal.energy.iter().map(move |&e| (s, e)).collect::<Vec<_>>();
+        let of_source =
+            |(s, source): (usize, &Source)| source.principal.energy.iter().map(move |&e| (s, e)).collect::<Vec<_>>();
         let mut order: Vec<(usize, f64)> = sources.iter().enumerate().flat_map(of_source).collect();
         let worth = |&(s, energy): &(usize, f64)| energy / sources[s].numbers() as f64;
         order.sort_by(|a, b| worth(b).total_cmp(&worth(a)));
@@ -320,7 +323,8 @@ impl LinearModel {
 pub(super) fn objective(sources: &[Source], models: &[LinearModel]) -> Vec<f64> {
     let samples: f64 = sources.iter().map(Source::samples).sum();
     let total: f64 = sources.iter().map(|s| s.principal.total).sum();
-    let kept = |(source, model): (&Source, &LinearModel)| source.principal.energy[..model.components()].iter().sum::<f64>();
+    let kept =
+        |(source, model): (&Source, &LinearModel)| source.principal.energy[..model.components()].iter().sum::<f64>();
     let left = total - sources.iter().zip(models).map(kept).sum::<f64>();
     [total, left].map(|energy| 255.0 * (energy.max(0.0) / samples).sqrt()).to_vec()
 }

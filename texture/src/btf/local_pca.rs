@@ -108,9 +108,7 @@ pub fn fit(btf: &Btf, options: &Options) -> Result<(LocalPca, FitReport), Textur
     let clusters = match target {
         Target::Bytes(bytes) => best_clusters(&sketch, bytes, length, options.seed),
         Target::Each(components) => cluster(&sketch, STANDARD_CLUSTERS, components.min(SKETCH / 2), options.seed),
-        Target::Error(_) | Target::Supported => {
-            cluster(&sketch, STANDARD_CLUSTERS, STANDARD_COMPONENTS, options.seed)
-        }
+        Target::Error(_) | Target::Supported => cluster(&sketch, STANDARD_CLUSTERS, STANDARD_COMPONENTS, options.seed),
     };
     let members = members_of(&clusters.labels);
     let places = places_of(&members, texels);
@@ -310,6 +308,14 @@ fn side_bytes(texels: usize, clusters: usize) -> usize {
 }
 
 impl LocalPca {
+    /// Bytes as the literature counts them, in 32-bit floats.
+    pub fn printed_bytes(&self) -> usize {
+        let components = self.components();
+        let shared: usize = components.iter().map(|&k| printed_bytes(0, self.frame.pairs(), 1, k, 4)).sum();
+        let own = self.places.iter().map(|place| components[usize::from(place.cluster)]);
+        shared + own.map(|k| printed_bytes(1, 0, 0, k, 4)).sum::<usize>()
+    }
+
     /// Number of components of each cluster.
     pub fn components(&self) -> Vec<usize> {
         self.models.iter().map(LinearModel::components).collect()

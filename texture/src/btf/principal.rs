@@ -133,7 +133,12 @@ fn column_gram(data: &DMatrix<f32>) -> DMatrix<f64> {
         let rows = data.rows(start, (4 * BLOCK).min(data.nrows() - start)).map(f64::from);
         rows.transpose() * rows
     };
-    starts.par_iter().map(block).collect::<Vec<_>>().iter().fold(DMatrix::zeros(data.ncols(), data.ncols()), |a, b| a + b)
+    starts
+        .par_iter()
+        .map(block)
+        .collect::<Vec<_>>()
+        .iter()
+        .fold(DMatrix::zeros(data.ncols(), data.ncols()), |a, b| a + b)
 }
 
 /// `DDᵀ` in f64, by blocks of columns summed in order.
@@ -144,7 +149,12 @@ fn row_gram(data: &DMatrix<f32>) -> DMatrix<f64> {
         let transposed = columns.transpose();
         columns * transposed
     };
-    starts.par_iter().map(block).collect::<Vec<_>>().iter().fold(DMatrix::zeros(data.nrows(), data.nrows()), |a, b| a + b)
+    starts
+        .par_iter()
+        .map(block)
+        .collect::<Vec<_>>()
+        .iter()
+        .fold(DMatrix::zeros(data.nrows(), data.nrows()), |a, b| a + b)
 }
 
 /// Eigenvectors of the largest eigenvalues of a symmetric matrix, as columns, and these; none that are rounding.
@@ -183,7 +193,8 @@ mod tests {
     /// Singular values 2^−j with smooth vectors.
     fn decaying(rows: usize, columns: usize, rank: usize) -> DMatrix<f32> {
         let wave = |side: usize, i: usize, j: usize| {
-            (std::f64::consts::PI * (i as f64 + 0.5) * (j as f64 + 1.0) / side as f64).cos() * (2.0 / side as f64).sqrt()
+            (std::f64::consts::PI * (i as f64 + 0.5) * (j as f64 + 1.0) / side as f64).cos()
+                * (2.0 / side as f64).sqrt()
         };
         DMatrix::from_fn(rows, columns, |i, k| {
             (0..rank).map(|j| 0.5f64.powi(j as i32) * wave(rows, i, j) * wave(columns, k, j)).sum::<f64>() as f32
@@ -191,7 +202,6 @@ mod tests {
     }
 
     fn residual(data: &DMatrix<f32>, principal: &Principal, k: usize) -> f64 {
-        
         let basis = principal.basis(data, k).map(f64::from);
         let exact = data.map(f64::from);
         (&exact - &basis * (basis.transpose() * &exact)).norm_squared()

@@ -138,11 +138,7 @@ fn pseudo_inverse(design: &DMatrix<f64>) -> DMatrix<f32> {
 }
 
 /// Coefficients, (texel, channel) × term, of pictures, (texel, channel) × light, and the sum of squared errors.
-fn coefficients(
-    view: &DMatrix<f32>,
-    inverse: &DMatrix<f32>,
-    design: &DMatrix<f64>,
-) -> (DMatrix<f32>, f64) {
+fn coefficients(view: &DMatrix<f32>, inverse: &DMatrix<f32>, design: &DMatrix<f64>) -> (DMatrix<f32>, f64) {
     let found = times(view, inverse);
     let transposed = design.transpose().cast::<f32>();
     let shown = times(&found, &transposed);
@@ -159,7 +155,11 @@ fn coded(coefficients: &DMatrix<f32>, gains: &[f64], noise: Noise) -> Rows {
         Noise::Bits(bits) => Coding::Bits(bits),
         Noise::Rms(rms) => Coding::Noise(rms / ((TERMS as f64).sqrt() * gains[j % TERMS].max(1e-3))),
     };
-    Rows::new(texels, (0..texels * COEFFICIENTS).map(value).collect(), &(0..COEFFICIENTS).map(coding).collect::<Vec<_>>())
+    Rows::new(
+        texels,
+        (0..texels * COEFFICIENTS).map(value).collect(),
+        &(0..COEFFICIENTS).map(coding).collect::<Vec<_>>(),
+    )
 }
 
 /// The least noise that `most` bytes allow.
@@ -253,7 +253,7 @@ mod tests {
 
     fn fitted(lights: &[Vector3<f64>], data: &DMatrix<f32>) -> (DMatrix<f32>, f64) {
         let design = design(lights);
-        coefficients(&data, &pseudo_inverse(&design), &design)
+        coefficients(data, &pseudo_inverse(&design), &design)
     }
 
     #[test]
