@@ -1,11 +1,11 @@
 //! Multi-level vector quantisation: what a ratio costs in error, and how quickly it answers.
 //!
-//! `cargo bench -p texture --bench multilevel_vq -- FOLDER [RATIO...]`: bytes, errors and seconds of one thread's work.
+//! `cargo bench -p texture --bench multilevel_vq -- FOLDER [RATIO | tTHRESHOLD...]`; seconds are the processor's, of all
+//! threads. Environment: `PAPER`, `SSIM`, and `SHARES=1,0.4,0.16,0.064,0.0256` take other options.
 
 use capture::btf::{Btf, read_folder};
 use nalgebra::Vector3;
 use std::path::Path;
-use std::time::Instant;
 use texture::btf::multilevel_vq::{Aim, Measure, MultilevelVq, Options, Phase, fit};
 use texture::btf::{Budget, Codec, Material, Precision, Sampler, to_coded_range};
 
@@ -29,6 +29,10 @@ fn main() {
         }
         if std::env::var_os("SSIM").is_some() {
             options.measure = Measure::Ssim;
+        }
+        if let Ok(shares) = std::env::var("SHARES") {
+            let all: Vec<f64> = shares.split(',').map(|s| s.parse().expect("a share")).collect();
+            options.squared_shares = all.try_into().expect("five shares");
         }
         options.aim = match budget.strip_prefix('t') {
             Some(threshold) => Aim::Threshold(threshold.parse().expect("a threshold")),
@@ -82,27 +86,27 @@ fn evaluations(codec: &MultilevelVq) -> f64 {
     let directions = directions();
     let texels = codec.frame().texels();
     let mut sum = 0.0;
-    let start = Instant::now();
+    let start = cpu_seconds();
     for i in 0..COUNT {
         let texel = i.wrapping_mul(2_654_435_761) % texels;
         sum += codec.value(texel, &directions[i % 1021], &directions[i % 1019])[1];
     }
     std::hint::black_box(sum);
-    COUNT as f64 / start.elapsed().as_secs_f64()
+    COUNT as f64 / (cpu_seconds() - start)
 }
 
 fn samples(codec: &MultilevelVq) -> f64 {
     let directions = directions();
     let texels = codec.frame().texels();
     let mut sum = 0.0;
-    let start = Instant::now();
+    let start = cpu_seconds();
     for i in 0..COUNT {
         let texel = i.wrapping_mul(2_654_435_761) % texels;
         let u = [0.618_034, 0.754_877_7, 0.569_840_3].map(|step: f32| (step * (i % 65_536) as f32).fract());
         sum += codec.sample(texel, &directions[i % 1019], u).1;
     }
     std::hint::black_box(sum);
-    COUNT as f64 / start.elapsed().as_secs_f64()
+    COUNT as f64 / (cpu_seconds() - start)
 }
 
 /// A spiral over the hemisphere, shuffled.

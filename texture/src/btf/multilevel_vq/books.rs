@@ -129,7 +129,10 @@ pub(super) fn settle(
     let (view_book, view_moments) = snap(&renumbered(&view_links, &pairs), Some(grid.theta), &pair_moments, precision);
     let (texel_book, texel_moments) = snap(&renumbered(&texel_links, &views), Some(grid.phi), &view_moments, precision);
     let plane = |(width, height, links): &(usize, usize, Vec<Link>)| {
-        let (mut book, _) = snap(&renumbered(links, &texels), None, &texel_moments, precision);
+        // Up to here luminance had the length it adds to RGB.
+        let absolute = |l: &Link| Link { child: l.child, scale: l.scale / LENGTHS[0] };
+        let links: Vec<Link> = renumbered(links, &texels).iter().map(absolute).collect();
+        let (mut book, _) = snap(&links, None, &texel_moments, precision);
         if book.links.iter().all(|link| *link == book.links[0]) {
             book.links.truncate(1);
         }

@@ -122,7 +122,7 @@ impl Grid {
     /// The unit vector of a slice and a sine of β: the inverse of [`Grid::onion`].
     #[inline]
     pub fn direction(&self, alpha: f32, s: f32) -> Vector3<f32> {
-        let radius = (1.0 - s * s).max(0.0).sqrt();
+        let radius = ((1.0 - s) * (1.0 + s)).max(0.0).sqrt();
         let (sin, cos) = alpha.sin_cos();
         let (other, z) = (radius * sin, (radius * cos).max(0.0));
         match self.axis {

@@ -97,8 +97,7 @@ impl Acceptance {
     /// The items worth testing: those of least cost, in the order of the book.
     pub(super) fn shortlist(&self, costs: impl Iterator<Item = f32>) -> Vec<usize> {
         if self.measure == Measure::Rmse {
-            let least = costs.enumerate().min_by(|a, b| a.1.total_cmp(&b.1));
-            return least.map(|(item, _)| item).into_iter().collect();
+            return least(costs).into_iter().collect();
         }
         let mut all: Vec<(f32, usize)> = costs.enumerate().map(|(item, cost)| (cost, item)).collect();
         let count = SHORTLIST.min(all.len());
@@ -125,6 +124,17 @@ impl Texel {
     pub(super) fn as_patch(&self) -> Patch<'_> {
         Patch { luma: &self.luma, chroma: &self.chroma }
     }
+}
+
+/// The item of least cost, the first of equals.
+fn least(costs: impl Iterator<Item = f32>) -> Option<usize> {
+    let (mut found, mut lowest) = (None, f32::INFINITY);
+    for (item, cost) in costs.enumerate() {
+        if cost < lowest {
+            (found, lowest) = (Some(item), cost);
+        }
+    }
+    found
 }
 
 fn squared(a: &[f32], b: &[f32]) -> f64 {

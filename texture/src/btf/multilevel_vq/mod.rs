@@ -15,13 +15,14 @@
 //!
 //! | file | what |
 //! |---|---|
-//! | [`grid`] | onion slices of equal solid angle, 11 × 11 × 7 × 16 |
-//! | [`resample`] | from the measured directions to the grid |
-//! | [`color`] | luminance and chroma |
-//! | [`measure`], [`search`] | when an item stands for a slice; the nearest one |
-//! | [`grow`] | the nest, grown texel by texel |
-//! | [`books`] | few bits, and the file |
-//! | [`evaluate`], [`importance`] | a sample; a direction |
+//! | `grid` | onion slices of equal solid angle, 11 × 11 × 7 × 16 |
+//! | `resample` | from the measured directions to the grid |
+//! | `color` | luminance and chroma |
+//! | `measure`, `search` | when an item stands for a slice; the nearest one |
+//! | `options` | budgets, phases, thresholds |
+//! | `grow` | the nest, grown texel by texel |
+//! | `books` | few bits, and the file |
+//! | `evaluate`, `importance` | a sample; a direction |
 //!
 //! *Order*: texels of a Halton sequence; the first 1 % under the threshold, 4 % under one whose square is 2.5 times as large,
 //! the rest. In the paper the rest becomes the nearest item of P4 ([`Phase::PAPER`]), which for small tiles is a poor
@@ -41,10 +42,10 @@
 mod books;
 pub mod color;
 mod evaluate;
-pub mod grid;
-pub mod grow;
+mod grid;
+mod grow;
 mod importance;
-pub mod measure;
+mod measure;
 mod options;
 mod resample;
 mod search;
@@ -73,6 +74,8 @@ use std::sync::Arc;
 const BLOCK: usize = 8;
 /// Texels in memory at a time.
 const BATCH: usize = 4 * BLOCK;
+/// Shares of smaller tiles count as those of so many texels: a handful of texels fills no books.
+const SMALL_TILE: usize = 3200;
 /// Rounds of the search for a threshold.
 const ROUNDS: usize = 12;
 /// A ratio is met within this share, from below.
@@ -170,7 +173,8 @@ fn fit_threshold(first: &Btf, inputs: &[Input<'_>], options: &Options, threshold
     for phase in options.phases {
         let accept = options.acceptance(threshold * phase.slack.sqrt());
         for (input, links) in inputs.iter().zip(&mut links) {
-            let place = |share: f64| ((share * input.order.len() as f64).ceil() as usize).min(input.order.len());
+            let count = input.order.len();
+            let place = |share: f64| ((share * count.max(SMALL_TILE) as f64).ceil() as usize).min(count);
             let texels = &input.order[place(before)..place(before + phase.share)];
             encode(&mut books, input, texels, &accept, phase.growth, links);
         }

@@ -7,10 +7,11 @@ use crate::TextureError;
 use crate::btf::{Budget, Precision};
 use capture::btf::Btf;
 
-/// Squared thresholds of P4, P3, M, P2, P1, as shares of the first.
-const SQUARED_SHARES: [f64; 5] = [1.0, 0.4, 0.16, 0.064, 0.0256];
-/// Thresholds of I2, I1, C, in levels of chroma.
+/// Thresholds of I2, I1, C are those of M, P2, P1, but not below these, in levels: the constants of the paper, where
+/// they are all there is.
 const COLOR_THRESHOLDS: [f64; 3] = [0.5, 0.2, 0.1];
+/// Falling by 0.4 from book to book, as in the paper, fills P3 and M with what P4 does not need.
+const SQUARED_SHARES: [f64; 5] = [1.0, 0.8, 0.64, 0.4, 0.16];
 /// The threshold of P4 without a budget, levels.
 const STANDARD: f64 = 4.0;
 /// The same where data shall be kept as far as can be seen.
@@ -29,6 +30,8 @@ pub struct Options {
     pub measure: Measure,
     /// Which texels may grow the books; shares sum to 1.
     pub phases: [Phase; 3],
+    /// Squared thresholds of P4, P3, M, P2, P1, as shares of the first; for SSIM all thresholds are one.
+    pub squared_shares: [f64; 5],
     /// How numbers are stored.
     pub precision: Precision,
     /// Whether smaller sizes are held too: a third more of P6.
@@ -96,6 +99,7 @@ impl Options {
             aim,
             measure: Measure::Rmse,
             phases: Phase::COMBINING,
+            squared_shares: SQUARED_SHARES,
             precision,
             mip_maps: false,
             seed,
@@ -127,8 +131,11 @@ impl Options {
         match self.measure {
             Measure::Rmse => Acceptance {
                 measure: self.measure,
-                luma: SQUARED_SHARES.map(|share| threshold * share.sqrt()),
-                chroma: COLOR_THRESHOLDS,
+                luma: self.squared_shares.map(|share| threshold * share.sqrt()),
+                chroma: std::array::from_fn(|k| {
+                    let own = threshold * self.squared_shares[k + 2].sqrt();
+                    if threshold > 0.0 { own.max(COLOR_THRESHOLDS[k]) } else { 0.0 }
+                }),
             },
             Measure::Ssim => {
                 let [_, row, color] = COLOR_THRESHOLDS;

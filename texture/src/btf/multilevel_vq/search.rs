@@ -48,8 +48,10 @@ impl Laesa {
     /// The nearest vector, the first of equals, and its distance.
     pub(super) fn nearest(&self, query: &[f32]) -> Option<(usize, f32)> {
         let own = self.distances(query);
-        let bound =
-            |item: usize| own.iter().zip(&self.to_bases[item]).map(|(a, b)| (a - b).abs()).fold(0.0_f32, f32::max);
+        let bound = |item: usize| {
+            let gaps: [f32; BASES] = std::array::from_fn(|b| (own[b] - self.to_bases[item][b]).abs());
+            gaps.into_iter().fold(0.0, |most, gap| if gap > most { gap } else { most })
+        };
         let bounds: Vec<f32> = (0..self.len()).map(bound).collect();
         let first = (0..self.len()).min_by(|&a, &b| bounds[a].total_cmp(&bounds[b]))?;
         let mut best = (first, distance(query, self.vector(first)));
@@ -96,7 +98,9 @@ mod tests {
     fn the_search_finds_what_looking_at_all_finds() {
         let all = vectors(10_000, 11);
         let mut laesa = Laesa::new(11);
-        all.chunks(11).for_each(|v| drop(laesa.insert(v)));
+        for vector in all.chunks(11) {
+            laesa.insert(vector);
+        }
         for query in vectors(10_050, 11).chunks(11).skip(10_000) {
             assert_eq!(laesa.nearest(query).unwrap().1, brute(&all, query));
         }
@@ -106,7 +110,9 @@ mod tests {
     fn duplicates_answer_with_the_first() {
         let mut laesa = Laesa::new(2);
         assert!(laesa.nearest(&[0.0, 0.0]).is_none());
-        (0..30).for_each(|_| drop(laesa.insert(&[1.0, 2.0])));
+        for _ in 0..30 {
+            laesa.insert(&[1.0, 2.0]);
+        }
         assert_eq!(laesa.nearest(&[1.0, 2.0]), Some((0, 0.0)));
     }
 
