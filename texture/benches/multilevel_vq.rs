@@ -1,12 +1,12 @@
 //! Multi-level vector quantisation: what a ratio costs in error, and how quickly it answers.
 //!
 //! `cargo bench -p texture --bench multilevel_vq -- FOLDER [RATIO | tTHRESHOLD...]`; seconds are the processor's, of all
-//! threads. Environment: `PAPER`, `SSIM`, and `SHARES=1,0.4,0.16,0.064,0.0256` take other options.
+//! threads. Environment: `CROP=16`, `GRID=11,11,7,16`, `PAPER`, `SSIM`, `SHARES=1,0.4,0.16,0.064,0.0256`.
 
 use capture::btf::{Btf, read_folder};
 use nalgebra::Vector3;
 use std::path::Path;
-use texture::btf::multilevel_vq::{Aim, Measure, MultilevelVq, Options, Phase, fit};
+use texture::btf::multilevel_vq::{Aim, Grid, Measure, MultilevelVq, Options, Phase, fit};
 use texture::btf::{Budget, Codec, Material, Precision, Sampler, to_coded_range};
 
 /// Answers timed.
@@ -17,7 +17,8 @@ fn main() {
     let Some(folder) = arguments.first() else {
         return println!("give a folder of pictures, and ratios");
     };
-    let btf = to_coded_range(read_folder(Path::new(folder), None).expect("a BTF"));
+    let crop = std::env::var("CROP").ok().and_then(|side| side.parse().ok());
+    let btf = to_coded_range(read_folder(Path::new(folder), crop).expect("a BTF"));
     println!(
         "{:>8} {:>9} {:>7} {:>7} {:>9} {:>10} {:>10}",
         "ratio", "bytes", "RMSE", "PSNR", "fit CPU s", "evals/s", "samples/s"
@@ -33,6 +34,11 @@ fn main() {
         if let Ok(shares) = std::env::var("SHARES") {
             let all: Vec<f64> = shares.split(',').map(|s| s.parse().expect("a share")).collect();
             options.squared_shares = all.try_into().expect("five shares");
+        }
+        if let Ok(sizes) = std::env::var("GRID") {
+            let sizes: Vec<usize> = sizes.split(',').map(|s| s.parse().expect("a size")).collect();
+            let [alpha, beta, theta, phi] = sizes.try_into().expect("four sizes");
+            options.grid = Grid { alpha, beta, theta, phi, ..options.grid };
         }
         options.aim = match budget.strip_prefix('t') {
             Some(threshold) => Aim::Threshold(threshold.parse().expect("a threshold")),

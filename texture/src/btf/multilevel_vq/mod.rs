@@ -31,7 +31,8 @@
 //! a BRDF is a material of one texel. *Mip-maps* are P6 of radiance averaged over 2 × 2 texels, out of the same books.
 //!
 //! *Cost*: per texel 5 M multiplications to resample and `112 (121 S₂ + 242 S_I2)` to compare with all books; a
-//! sample is 16 chains of look-ups. *Limits*: between the cells, 12° to 16° wide, everything is linear; beyond the outermost measured
+//! sample is 16 chains of look-ups. *Limits*: 16 azimuths of the view cannot hold the 24 of the outermost measured ring; where parallax
+//! is strong, `grid.phi = 24` halves the error of the grid itself. Between the cells, 12° to 16° wide, everything is linear; beyond the outermost measured
 //! polar angle it is that of the rim; chroma is not scaled with luminance. Constant data take one item per book
 //! and no P6; black has scale 0; missing or repeated directions are bridged by the resampling.
 //!
@@ -80,6 +81,8 @@ const SMALL_TILE: usize = 3200;
 const ROUNDS: usize = 12;
 /// A ratio is met within this share, from below.
 const RATIO_TOLERANCE: f64 = 0.03;
+/// The first threshold tried.
+const FIRST_THRESHOLD: f64 = 16.0;
 /// Thresholds searched, in levels or in hundredths of `1 − SSIM`.
 const THRESHOLDS: [f64; 2] = [0.02, 200.0];
 /// Encoded samples go by about this root of radiance: 2.4 with a linear toe.
@@ -235,29 +238,36 @@ fn encode(
     }
 }
 
-/// The threshold under which a size falls into a range, by bisecting its logarithm; what comes nearest, with a note, where none does.
+/// The threshold under which a size falls into a range: doubled or halved until it is enclosed, then bisected on its
+/// logarithm. What comes nearest, with a note, where none does.
 fn search_threshold(
     [low, high]: [f64; 2],
     size: impl Fn(&MultilevelVq) -> f64,
     fit: impl Fn(f64) -> MultilevelVq,
     report: &mut FitReport,
 ) -> MultilevelVq {
-    let mut range = THRESHOLDS.map(f64::ln);
-    let mut at = 0.0_f64;
-    loop {
-        let codec = fit(at.exp());
-        let found = size(&codec);
+    let distance = |found: f64| (found / high).ln().max((low / found).ln()).max(0.0);
+    let mut best = fit(FIRST_THRESHOLD);
+    let mut nearest = size(&best);
+    report.objective.push(nearest);
+    let (mut at, mut found) = (FIRST_THRESHOLD, nearest);
+    let mut enclosed = THRESHOLDS;
+    while report.objective.len() < ROUNDS && distance(nearest) > 0.0 && enclosed[1] / enclosed[0] > 1.001 {
+        let next = if found > high { 2.0 * at } else { 0.5 * at };
+        enclosed = if found > high { [at, enclosed[1]] } else { [enclosed[0], at] };
+        let inside = next > enclosed[0] && next < enclosed[1];
+        at = if inside { next } else { (enclosed[0] * enclosed[1]).sqrt() };
+        let codec = fit(at);
+        found = size(&codec);
         report.objective.push(found);
-        if (low..=high).contains(&found) {
-            return codec;
+        if distance(found) < distance(nearest) {
+            (best, nearest) = (codec, found);
         }
-        range = if found > high { [at, range[1]] } else { [range[0], at] };
-        if report.objective.len() >= ROUNDS || range[1] - range[0] < 1e-3 {
-            report.notes.push(format!("{found:.0} came nearest to {low:.0}..{high:.0}"));
-            return codec;
-        }
-        at = (range[0] + range[1]) / 2.0;
     }
+    if distance(nearest) > 0.0 {
+        report.notes.push(format!("{nearest:.0} came nearest to {low:.0}..{high:.0}"));
+    }
+    best
 }
 
 /// Bytes of the file.

@@ -11,7 +11,7 @@ use capture::btf::Btf;
 /// they are all there is.
 const COLOR_THRESHOLDS: [f64; 3] = [0.5, 0.2, 0.1];
 /// Falling by 0.4 from book to book, as in the paper, fills P3 and M with what P4 does not need.
-const SQUARED_SHARES: [f64; 5] = [1.0, 0.8, 0.64, 0.4, 0.16];
+const SQUARED_SHARES: [f64; 5] = [1.0, 0.9, 0.8, 0.65, 0.5];
 /// The threshold of P4 without a budget, levels.
 const STANDARD: f64 = 4.0;
 /// The same where data shall be kept as far as can be seen.

@@ -20,8 +20,8 @@ use nalgebra::{DMatrix, DMatrixView, Vector3};
 
 /// Singular values of the basis functions' system below this share of the largest are 0.
 const RANK_TOLERANCE: f64 = 1e-9;
-/// Ridge of the correction.
-const RIDGE: f64 = 1e-3;
+/// Ridge of the correction: what several directions of one cell say differently is multiplied by `1/(2√μ)` at most.
+const RIDGE: f64 = 0.05;
 /// Rounds within which singular values are found.
 const MAX_ROUNDS: usize = 10_000;
 
@@ -142,7 +142,7 @@ fn radial_weights(sites: &[Vector3<f64>], nodes: &[Vector3<f64>]) -> Result<DMat
     });
     let decomposed = system.try_svd(true, true, f64::EPSILON, MAX_ROUNDS).ok_or_else(unsolved)?;
     let tolerance = RANK_TOLERANCE * decomposed.singular_values.max();
-    let inverse = decomposed.pseudo_inverse(tolerance).map_err(|_| unsolved())?;
+    let inverse = decomposed.pseudo_inverse(tolerance).ok().ok_or_else(unsolved)?;
     let raised: Vec<Vector3<f64>> = nodes.iter().map(|d| within_rim(d, rim)).collect();
     let evaluated = DMatrix::from_fn(nodes.len(), n + 4, |node, k| basis(&raised[node], k));
     let mut found = evaluated * inverse.columns(0, n);
