@@ -32,7 +32,7 @@ const PSNR_CAP_DB: f64 = 99.0;
 const SSIM_SIGMA: f64 = 1.5;
 /// `int(3.5 σ + ½)`.
 const SSIM_RADIUS: usize = 5;
-const LUMA: [f64; 3] = [0.299, 0.587, 0.114];
+pub(crate) const LUMA: [f64; 3] = [0.299, 0.587, 0.114];
 
 /// The figures of one view; see the module's table.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
@@ -179,7 +179,7 @@ fn erode_box(mask: &[bool], width: usize, height: usize, radius: usize) -> Vec<b
 }
 
 /// Structural similarity at every pixel.
-fn ssim_map(x: &[f64], y: &[f64], width: usize, height: usize) -> Vec<f64> {
+pub(crate) fn ssim_map(x: &[f64], y: &[f64], width: usize, height: usize) -> Vec<f64> {
     let blurred = |f: &dyn Fn(usize) -> f64| gaussian(&(0..x.len()).map(f).collect::<Vec<_>>(), width, height);
     let [mean_x, mean_y] = [blurred(&|i| x[i]), blurred(&|i| y[i])];
     let [xx, yy, xy] = [blurred(&|i| x[i] * x[i]), blurred(&|i| y[i] * y[i]), blurred(&|i| x[i] * y[i])];

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use turnlight::Selection;
 use turnlight::capture::Board;
 use turnlight::capture::board::{Dictionary, Paper, parse_length};
+use turnlight::texture::btf::{Budget, CodecKind, Precision};
 
 /// What this build can and cannot do.
 const FILMS: &str = if cfg!(feature = "video") {
@@ -75,6 +76,122 @@ pub(crate) enum Command {
 pub(crate) enum BtfCommand {
     /// Measure a synthetic material whose truth is known
     Synth(BtfSynthArgs),
+    /// Fit a codec to a measured material
+    Fit(BtfFitArgs),
+    /// Judge a coded material by the data it was fitted to
+    Eval(BtfEvalArgs),
+    /// Fit all codecs at several sizes, and compare size, error and speed
+    Compare(BtfCompareArgs),
+}
+
+/// Measured data and how they are read.
+#[derive(Clone, Debug, Args)]
+pub(crate) struct BtfDataArgs {
+    /// A folder of pictures named by angles, an .lp list of lights, a .btf or a .binary file
+    pub(crate) data: PathBuf,
+    /// Take the middle N × N texels alone
+    #[arg(long, value_name = "N", value_parser = texels)]
+    pub(crate) crop: Option<usize>,
+}
+
+/// How numbers are stored.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(crate) enum PrecisionArg {
+    /// 32-bit floats
+    Full,
+    /// 8 and 16 bits where they suffice
+    Compact,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct BtfFitArgs {
+    #[command(flatten)]
+    pub(crate) data: BtfDataArgs,
+    /// The file to write
+    #[arg(short, long, value_name = "FILE.btfz")]
+    pub(crate) output: PathBuf,
+    /// gaussian-mixture, multilevel-vq, pca, pca-view, local-pca, ptm, lafortune, gmrf, car2d or car3d
+    #[arg(long, value_name = "NAME")]
+    pub(crate) codec: CodecKind,
+    #[command(flatten)]
+    pub(crate) budget: BudgetArgs,
+    /// How numbers are stored
+    #[arg(long, value_enum, default_value = "compact")]
+    pub(crate) precision: PrecisionArg,
+    /// Seed of everything random
+    #[arg(long, default_value = "1")]
+    pub(crate) seed: u64,
+}
+
+/// How large a coded material may be; by default, what the codec's authors used.
+#[derive(Clone, Copy, Debug, Args)]
+#[group(multiple = false)]
+pub(crate) struct BudgetArgs {
+    /// Raw bytes over coded bytes, everything counted
+    #[arg(long, value_name = "R", value_parser = ratio)]
+    pub(crate) ratio: Option<f64>,
+    /// From 0, small, to 100, faithful
+    #[arg(long, value_name = "Q", value_parser = quality)]
+    pub(crate) quality: Option<f64>,
+    /// What the codec counts: components, clusters, coefficients; auto: as many as the data support
+    #[arg(long, value_name = "M", value_parser = components)]
+    pub(crate) components: Option<Auto<usize>>,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct BtfEvalArgs {
+    /// The coded material
+    pub(crate) material: PathBuf,
+    #[command(flatten)]
+    pub(crate) data: BtfDataArgs,
+    /// Write original, decoded, and ten times their difference
+    #[arg(long, value_name = "FILE.png")]
+    pub(crate) sheet: Option<PathBuf>,
+    /// Seed of the questions that are timed, and of synthesis
+    #[arg(long, default_value = "1")]
+    pub(crate) seed: u64,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct BtfCompareArgs {
+    #[command(flatten)]
+    pub(crate) data: BtfDataArgs,
+    /// The folder to write: report.html, report.json, pictures
+    #[arg(short, long, value_name = "REPORT")]
+    pub(crate) output: Option<PathBuf>,
+    /// The codecs, by commas; all by default
+    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    pub(crate) codecs: Vec<CodecKind>,
+    /// Ratios asked of each codec that can choose its size
+    #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "50,100,200,500,1000,2000", value_parser = ratio)]
+    pub(crate) ratios: Vec<f64>,
+    /// How numbers are stored, by all alike
+    #[arg(long, value_enum, default_value = "compact")]
+    pub(crate) precision: PrecisionArg,
+    /// Seed of everything random
+    #[arg(long, default_value = "1")]
+    pub(crate) seed: u64,
+}
+
+impl From<PrecisionArg> for Precision {
+    fn from(arg: PrecisionArg) -> Self {
+        match arg {
+            PrecisionArg::Full => Self::Full,
+            PrecisionArg::Compact => Self::Compact,
+        }
+    }
+}
+
+impl BudgetArgs {
+    pub(crate) fn budget(&self) -> Budget {
+        match (self.ratio, self.quality, self.components) {
+            (Some(ratio), _, _) => Budget::Ratio(ratio),
+            (_, Some(quality), _) => Budget::Quality(quality),
+            (_, _, Some(Auto(Some(count)))) => Budget::Components(count),
+            (_, _, Some(Auto(None))) => Budget::Auto,
+            _ => Budget::Standard,
+        }
+    }
 }
 
 /// A calibrated folder and how it is read.
@@ -221,7 +338,8 @@ pub(crate) struct CaptureFootageArgs {
     /// Picture of the set without object and table, one for every film or folder
     #[arg(long, value_name = "IMAGE")]
     pub(crate) clean_plate: Vec<PathBuf>,
-    /// Outline of a shiny ball that stands in the room, in pixels: its highlight shows where the light is
+    /// Outline of a shiny ball that stands in the room, in pixels, to a tenth of its radius: its highlight shows where the
+    /// light is
     #[arg(long, value_name = "X,Y,RADIUS", value_parser = circle)]
     pub(crate) light_ball: Option<[f64; 3]>,
     /// Frames to keep at most [default: 72 a turn]
@@ -486,7 +604,8 @@ pub(crate) struct TurntableArgs {
     /// The table turned by this angle from photograph to photograph, in degrees
     #[arg(long, value_name = "DEG", group = "turn", value_parser = step, allow_negative_numbers = true)]
     pub(crate) step: Option<f64>,
-    /// A text file with the angle of each photograph in degrees, one a line
+    /// A text file with the angle of each photograph in degrees, one a line: in the order of their names, or after the
+    /// name of the photograph (`IMG_0012.jpg 37.5`), in any order
     #[arg(long, value_name = "FILE", group = "turn")]
     pub(crate) angles: Option<PathBuf>,
 }
@@ -542,6 +661,18 @@ fn consensus(text: &str) -> Result<Auto<usize>, String> {
 
 fn grow(text: &str) -> Result<Auto<f64>, String> {
     auto(text, |text| within(text, -64.0, 64.0))
+}
+
+fn components(text: &str) -> Result<Auto<usize>, String> {
+    auto(text, |text| bounded(text, 65_536))
+}
+
+fn ratio(text: &str) -> Result<f64, String> {
+    within(text, 1.0, 1e7)
+}
+
+fn quality(text: &str) -> Result<f64, String> {
+    within(text, 0.0, 100.0)
 }
 
 fn auto<T>(text: &str, parse: impl Fn(&str) -> Result<T, String>) -> Result<Auto<T>, String> {

@@ -1,6 +1,7 @@
 //! Image-based modelling from turntable photographs: the whole pipeline, the comparison of methods, and
 //! what the `turnlight` command shares with programs that call the library.
 //!
+//! - [`btf`]: coded materials, judged and compared;
 //! - [`pipeline`]: views → hull → simplified mesh → atlas → appearance;
 //! - [`evaluate`]: the four methods on held-out views, as JSON, CSV and one HTML page;
 //! - [`colmap`]: cameras from an installed COLMAP, where there is no board;
@@ -13,6 +14,7 @@
 //! - [`stages`]: what each stage costs;
 //! - [`truth`]: a mesh held against the true one.
 
+pub mod btf;
 pub mod colmap;
 mod error;
 pub mod evaluate;

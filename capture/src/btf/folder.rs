@@ -10,10 +10,9 @@
 //! others linear. A pair without a picture is filled from the nearest light of its view, or else from the
 //! nearest view under its light.
 
-use super::{Btf, BtfDirection, Encoding, nearest_first};
+use super::pictures::{is_deep, read_pictures};
+use super::{Btf, BtfDirection, Encoding};
 use crate::CaptureError;
-use image::{DynamicImage, GenericImageView};
-use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -46,7 +45,7 @@ pub fn read_folder(folder: &Path, crop: Option<usize>) -> Result<Btf, CaptureErr
         return Err(CaptureError::invalid(folder, "it holds no picture whose name says view and light", remedy));
     };
     let description = describe(folder)?;
-    let (_, size, deep) = read_picture(&first.path, crop)?;
+    let deep = is_deep(&first.path);
     let views = distinct(pictures.iter().map(|p| p.view));
     let lights = distinct(pictures.iter().map(|p| p.light));
     let default = if deep { Encoding::Linear } else { Encoding::Srgb };
@@ -55,8 +54,8 @@ pub fn read_folder(folder: &Path, crop: Option<usize>) -> Result<Btf, CaptureErr
         name: description.name.unwrap_or(name),
         views: views.iter().map(|d| d.vector()).collect(),
         lights: lights.iter().map(|d| d.vector()).collect(),
-        width: size[0],
-        height: size[1],
+        width: 0,
+        height: 0,
         encoding: description.encoding.unwrap_or(default),
         exposure: description.exposure.unwrap_or(1.0),
         includes_cosine: description.includes_cosine.unwrap_or(true),
@@ -64,7 +63,7 @@ pub fn read_folder(folder: &Path, crop: Option<usize>) -> Result<Btf, CaptureErr
         samples: Vec::new(),
         measured: Vec::new(),
     };
-    place(&mut btf, &grid(&pictures, &views, &lights)?, crop)?;
+    read_pictures(&mut btf, &grid(&pictures, &views, &lights)?, crop)?;
     btf.check()?;
     Ok(btf)
 }
@@ -153,56 +152,4 @@ fn grid<'a>(
         }
     }
     Ok(grid)
-}
-
-/// Reads all pictures into the grid, and fills the pairs that have none.
-fn place(btf: &mut Btf, grid: &[Option<&Path>], crop: Option<usize>) -> Result<(), CaptureError> {
-    let length = 3 * btf.texels();
-    btf.samples = vec![0.0; grid.len() * length];
-    let size = [btf.width, btf.height];
-    let read = |(target, path): (&mut [f32], &Option<&Path>)| -> Result<(), CaptureError> {
-        let Some(path) = path else { return Ok(()) };
-        let (pixels, found, _) = read_picture(path, crop)?;
-        if found != size {
-            let fault = format!("it is {} × {}, others are {} × {}", found[0], found[1], size[0], size[1]);
-            return Err(CaptureError::invalid(path, fault, "rectify all pictures to one size"));
-        }
-        target.copy_from_slice(&pixels);
-        Ok(())
-    };
-    btf.samples.par_chunks_mut(length).zip(grid).try_for_each(read)?;
-    if grid.iter().any(Option::is_none) {
-        btf.measured = grid.iter().map(Option::is_some).collect();
-        fill_pairs(btf);
-    }
-    Ok(())
-}
-
-/// Each missing picture from the nearest light of its view; where a view has none, from the nearest view.
-fn fill_pairs(btf: &mut Btf) {
-    let (length, lights) = (3 * btf.texels(), btf.lights.len());
-    let by_light: Vec<Vec<usize>> = btf.lights.iter().map(|l| nearest_first(l, &btf.lights)).collect();
-    let by_view: Vec<Vec<usize>> = btf.views.iter().map(|v| nearest_first(v, &btf.views)).collect();
-    for pair in 0..btf.measured.len() {
-        let (view, light) = (pair / lights, pair % lights);
-        let same_view = by_light[light].iter().map(|l| view * lights + l);
-        let same_light = by_view[view].iter().map(|v| v * lights + light);
-        let source = same_view.chain(same_light).find(|&p| btf.measured[p]);
-        if let (false, Some(source)) = (btf.measured[pair], source) {
-            btf.samples.copy_within(source * length..(source + 1) * length, pair * length);
-        }
-    }
-}
-
-/// Pixels (y, x, channel), size, and whether they are floats.
-fn read_picture(path: &Path, crop: Option<usize>) -> Result<(Vec<f32>, [usize; 2], bool), CaptureError> {
-    let unreadable =
-        |e: image::ImageError| CaptureError::invalid(path, e.to_string(), "export it again as PNG, JPEG or EXR");
-    let picture = image::ImageReader::open(path).map_err(|e| CaptureError::io(path, e))?;
-    let picture = picture.with_guessed_format().map_err(|e| CaptureError::io(path, e))?.decode().map_err(unreadable)?;
-    let deep = matches!(picture, DynamicImage::ImageRgb32F(_) | DynamicImage::ImageRgba32F(_));
-    let (width, height) = picture.dimensions();
-    let [cut_width, cut_height] = [width, height].map(|n| crop.map_or(n, |crop| n.min(crop.max(1) as u32)));
-    let picture = picture.crop_imm((width - cut_width) / 2, (height - cut_height) / 2, cut_width, cut_height);
-    Ok((picture.into_rgb32f().into_raw(), [cut_width as usize, cut_height as usize], deep))
 }

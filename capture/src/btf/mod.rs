@@ -10,14 +10,22 @@
 //! - Samples are laid out (view, light, y, x, channel), RGB, encoded as [`Encoding`] says.
 
 mod directions;
+mod factored;
 mod folder;
+mod lights;
+mod merl;
+mod pictures;
 
 pub use directions::{BtfDirection, DIRECTIONS, bonn_directions};
+pub use factored::read_factored;
 pub use folder::read_folder;
+pub use lights::read_light_stack;
+pub use merl::{half_difference, read_merl};
 
 use crate::CaptureError;
 use nalgebra::Vector3;
 use rayon::prelude::*;
+use std::path::{Path, PathBuf};
 
 /// How a sample stands for radiance `L · exposure`.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -61,6 +69,36 @@ pub struct Btf {
     pub samples: Vec<f32>,
     /// Per pair, (view, light): false where the picture was filled in. Empty where all were measured.
     pub measured: Vec<bool>,
+}
+
+/// Reads measured data by its kind: a folder of pictures named by angles, or with one `.lp` list of lights in it;
+/// such a list; a `.btf` file; a `.binary` table. Tiles are cut to their middle `crop` × `crop` texels.
+///
+/// # Errors
+/// Names the file that cannot be read.
+pub fn read(path: &Path, crop: Option<usize>) -> Result<Btf, CaptureError> {
+    let extension = path.extension().map_or_else(String::new, |e| e.to_string_lossy().to_ascii_lowercase());
+    match extension.as_str() {
+        _ if path.is_dir() => match lists_of_lights(path)?.as_slice() {
+            [list] => read_light_stack(list, crop),
+            _ => read_folder(path, crop),
+        },
+        "lp" => read_light_stack(path, crop),
+        "btf" => read_factored(path, crop),
+        "binary" => read_merl(path),
+        _ if !path.exists() => Err(CaptureError::io(path, std::io::ErrorKind::NotFound.into())),
+        _ => {
+            let remedy = "give a folder of pictures named like `00008 tl000 pl000 tv030 pv030.png`, an .lp, .btf or .binary file";
+            Err(CaptureError::invalid(path, "it is no measured material of a known kind", remedy))
+        }
+    }
+}
+
+fn lists_of_lights(folder: &Path) -> Result<Vec<PathBuf>, CaptureError> {
+    let entries = std::fs::read_dir(folder).map_err(|e| CaptureError::io(folder, e))?;
+    let mut lists: Vec<PathBuf> = entries.filter_map(|entry| Some(entry.ok()?.path())).collect();
+    lists.retain(|path| path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("lp")));
+    Ok(lists)
 }
 
 impl Encoding {

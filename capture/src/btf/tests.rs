@@ -46,3 +46,57 @@ fn lengths_that_disagree_are_refused() {
     btf.samples.pop();
     assert!(btf.check().unwrap_err().to_string().contains("needs 36 samples, 35 are there"));
 }
+
+/// A folder with a picture of one grey level per named pair of angles.
+fn folder(names: &[(&str, u8)]) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, level) in names {
+        image::RgbImage::from_pixel(3, 2, image::Rgb([*level; 3])).save(folder.path().join(name)).unwrap();
+    }
+    folder
+}
+
+#[test]
+fn angles_are_read_from_names_and_missing_pairs_filled() {
+    let folder = folder(&[
+        ("00000 tl000 pl000 tv000 pv000.png", 51),
+        ("00001 tl030 pl090 tv000 pv000.png", 102),
+        ("tl000_pl000_tv045_pv180.png", 204),
+    ]);
+    let btf = read(folder.path(), None).unwrap();
+    assert_eq!((btf.views.len(), btf.lights.len(), btf.width, btf.height), (2, 2, 3, 2));
+    assert!((btf.lights[1] - Vector3::new(0.0, 0.5, 0.75_f64.sqrt())).norm() < 1e-12);
+    assert_eq!([0, 1, 2, 3].map(|pair| btf.is_measured(pair / 2, pair % 2)), [true, true, true, false]);
+    // The light that is missing of the second view is filled from the other one.
+    assert!((btf.picture(1, 1)[0] - 0.8).abs() < 1e-6 && (btf.picture(0, 1)[0] - 0.4).abs() < 1e-6);
+}
+
+#[test]
+fn two_pictures_of_one_pair_are_refused() {
+    let folder = folder(&[("0 tl000 pl000 tv000 pv000.png", 1), ("1 tl000 pl360 tv000 pv000.png", 2)]);
+    assert!(read(folder.path(), None).unwrap_err().to_string().contains("same view and light"));
+}
+
+#[test]
+fn a_list_of_lights_names_its_pictures() {
+    let folder = folder(&[("lion 1.png", 51), ("lion 2.png", 255)]);
+    let list = folder.path().join("dirs.lp");
+    std::fs::write(&list, "2\r\nlion 1.png 0 0 2\r\nlion 2.png 3 0 4\r\n").unwrap();
+    let btf = read(folder.path(), Some(1)).unwrap();
+    assert_eq!((btf.views.len(), btf.width, btf.height), (1, 1, 1));
+    assert!((btf.lights[1] - Vector3::new(0.6, 0.0, 0.8)).norm() < 1e-12);
+    assert!((btf.picture(0, 0)[0] - 0.2).abs() < 1e-6 && btf.picture(0, 1)[0] == 1.0);
+    for (text, said) in
+        [("3\na 0 0 1\n", "3 pictures are announced"), ("1\na 0 0 -1\n", "below the surface"), ("", "number")]
+    {
+        std::fs::write(&list, text).unwrap();
+        assert!(read(&list, None).unwrap_err().to_string().contains(said), "{text}");
+    }
+}
+
+#[test]
+fn what_is_no_material_is_named() {
+    let file = tempfile::Builder::new().suffix(".txt").tempfile().unwrap();
+    assert!(read(file.path(), None).unwrap_err().to_string().contains("no measured material"));
+    assert!(read("nowhere.btf".as_ref(), None).is_err());
+}

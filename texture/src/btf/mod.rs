@@ -20,6 +20,7 @@
 //! To add a codec: a file with its page, `Options`, `fit`, [`Sampler`] or [`Synthesizer`], and
 //! [`Stored`](container::Stored); an entry in [`CodecKind`], [`Codec`] and `fit`; its decoder among the fuzz targets.
 
+mod budget;
 pub mod car2d;
 pub mod car3d;
 pub mod container;
@@ -27,14 +28,22 @@ mod frame;
 pub mod gaussian_mixture;
 pub mod gmrf;
 pub mod lafortune;
+mod linear;
 pub mod local_pca;
+mod lookup;
 pub mod multilevel_vq;
 pub mod pca;
 pub mod pca_view;
+mod principal;
 pub mod ptm;
+mod random_field;
+mod rows;
+mod score;
+pub mod statistics;
 
 pub use container::Part;
 pub use frame::{Blend, DirectionSet, Frame};
+pub use score::{Score, score};
 
 use crate::TextureError;
 use capture::btf::{Btf, Encoding};
@@ -65,6 +74,36 @@ pub trait Synthesizer: Send + Sync {
     /// A tile of `[width, height]` texels under one light and view, (y, x, channel); the same seed gives the
     /// same surface under every light and view. It continues itself on all sides.
     fn picture(&self, size: [usize; 2], seed: u64, light: &Vector3<f32>, view: &Vector3<f32>) -> Vec<f32>;
+}
+
+/// A synthesizer at one size and seed, asked as if it were a sampler.
+#[derive(Clone, Copy)]
+pub struct Synthesized<'a> {
+    synthesizer: &'a dyn Synthesizer,
+    size: [usize; 2],
+    seed: u64,
+}
+
+impl<'a> Synthesized<'a> {
+    /// Tiles of `[width, height]` texels.
+    pub fn new(synthesizer: &'a dyn Synthesizer, size: [usize; 2], seed: u64) -> Self {
+        Self { synthesizer, size, seed }
+    }
+}
+
+impl Sampler for Synthesized<'_> {
+    fn frame(&self) -> &Frame {
+        self.synthesizer.frame()
+    }
+
+    fn value(&self, texel: usize, light: &Vector3<f32>, view: &Vector3<f32>) -> [f32; 3] {
+        let picture = self.picture(light, view);
+        [0, 1, 2].map(|c| picture[3 * texel + c])
+    }
+
+    fn picture(&self, light: &Vector3<f32>, view: &Vector3<f32>) -> Vec<f32> {
+        self.synthesizer.picture(self.size, self.seed, light, view)
+    }
 }
 
 /// How large the coded material may be.
@@ -310,6 +349,13 @@ fn fit_codec(btf: &Btf, options: &FitOptions) -> Result<(Codec, FitReport), Text
     })
 }
 
+impl CodecKind {
+    /// Whether its size can be chosen; otherwise its authors fixed it.
+    pub fn has_sizes(self) -> bool {
+        !matches!(self, Self::Ptm | Self::Lafortune | Self::Gmrf | Self::Car2d | Self::Car3d)
+    }
+}
+
 impl std::fmt::Display for CodecKind {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(self.name())
@@ -323,6 +369,12 @@ impl FromStr for CodecKind {
         let known = || Self::ALL.iter().map(|kind| kind.name()).collect::<Vec<_>>().join(", ");
         let found = Self::ALL.iter().copied().find(|kind| kind.name() == name);
         found.ok_or_else(|| format!("no codec is called {name}; there are {}", known()))
+    }
+}
+
+impl std::fmt::Debug for Synthesized<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Synthesized").field("size", &self.size).field("seed", &self.seed).finish_non_exhaustive()
     }
 }
 

@@ -2,15 +2,24 @@
 
 use super::synth::refuse_occupied;
 use crate::Answer;
-use crate::arguments::{BtfCommand, BtfSynthArgs};
+use crate::arguments::{BtfCommand, BtfCompareArgs, BtfDataArgs, BtfEvalArgs, BtfFitArgs, BtfSynthArgs};
 use serde_json::json;
+use std::path::Path;
 use turnlight::Error;
+use turnlight::btf::{CompareOptions, compare as compare_codecs, evaluate, html, sheet, text};
+use turnlight::capture::{btf as measured, write_rgb};
 use turnlight::data_synth::btf::{BtfMaterial, BtfOptions, DIRECTIONS, write_btf};
+use turnlight::output::{OutputFolder, write_file};
 use turnlight::stages::{Observer, Stages};
+use turnlight::texture::TextureError;
+use turnlight::texture::btf::{CodecKind, FitOptions, Material, fit as fit_codec, to_coded_range};
 
 pub(crate) fn run(command: &BtfCommand, observer: &dyn Observer) -> Result<Answer, Error> {
     match command {
         BtfCommand::Synth(args) => synth(args, observer),
+        BtfCommand::Fit(args) => fit(args, observer),
+        BtfCommand::Eval(args) => eval(args, observer),
+        BtfCommand::Compare(args) => compare(args, observer),
     }
 }
 
@@ -44,4 +53,97 @@ fn synth(args: &BtfSynthArgs, observer: &dyn Observer) -> Result<Answer, Error> 
         "stages": stages.finished(),
     });
     Ok(Answer { text, json })
+}
+
+fn read(args: &BtfDataArgs, stages: &mut Stages<'_>) -> Result<measured::Btf, Error> {
+    let btf = stages.run("read", |_| measured::read(&args.data, args.crop))?;
+    let filled = btf.measured.iter().filter(|measured| !**measured).count();
+    if filled > 0 {
+        stages
+            .observer()
+            .noted(&format!("{filled} of {} pairs are missing, filled from the nearest light", btf.pairs()));
+    }
+    Ok(btf)
+}
+
+fn fit(args: &BtfFitArgs, observer: &dyn Observer) -> Result<Answer, Error> {
+    let mut stages = Stages::new(observer);
+    let btf = read(&args.data, &mut stages)?;
+    let raw_bytes = btf.raw_bytes();
+    let options = FitOptions {
+        codec: args.codec,
+        budget: args.budget.budget(),
+        precision: args.precision.into(),
+        seed: args.seed,
+    };
+    let (material, report) = stages.run("fit", |_| fit_codec(btf, &options))?;
+    let (bytes, parts) = material.to_bytes();
+    write_file(&args.output, &bytes)?;
+    report.notes.iter().for_each(|note| observer.noted(note));
+    let ratio = raw_bytes as f64 / bytes.len() as f64;
+    let path = args.output.display();
+    let text = format!("{}, {}: {} bytes, 1:{ratio:.1}\nwrote {path}", material.name, args.codec, bytes.len());
+    let json = json!({
+        "codec": args.codec.name(),
+        "bytes": bytes.len(),
+        "parts": parts,
+        "raw_bytes": raw_bytes,
+        "ratio": ratio,
+        "objective": report.objective,
+        "notes": report.notes,
+        "material": args.output,
+        "stages": stages.finished(),
+    });
+    Ok(Answer { text, json })
+}
+
+fn eval(args: &BtfEvalArgs, observer: &dyn Observer) -> Result<Answer, Error> {
+    let mut stages = Stages::new(observer);
+    let material = read_material(&args.material)?;
+    let btf = read(&args.data, &mut stages)?;
+    if let Some(path) = &args.sheet {
+        let coded = if btf.encoding == material.encoding { btf.clone() } else { to_coded_range(btf.clone()) };
+        write_rgb(path, &sheet(&material, &coded, args.seed))?;
+    }
+    let found = stages.run("evaluate", |_| evaluate(&material, btf, args.seed))?;
+    let s = &found.score;
+    let mut text = format!(
+        "{}: {} bytes, 1:{:.1}; RMSE {:.3}, PSNR {:.2} dB, SSIM {:.4}",
+        found.codec, found.bytes, found.ratio, s.rmse, s.psnr_db, s.ssim
+    );
+    if let Some(speed) = found.speed {
+        let [one, all] = [speed.evals_per_s_core, speed.evals_per_s_all].map(|rate| rate / 1e6);
+        text.push_str(&format!("; {one:.2} M answers/s on one core, {all:.2} on all"));
+    }
+    Ok(Answer { text, json: json!(found) })
+}
+
+fn read_material(path: &Path) -> Result<Material, Error> {
+    let bytes = std::fs::read(path).map_err(|fault| Error::Failed(format!("{}: {fault}", path.display())))?;
+    let remedy = "fit it again with `turnlight btf fit`".to_owned();
+    let material = Material::from_bytes(&bytes).map_err(|fault| TextureError::Invalid {
+        path: path.to_owned(),
+        fault: fault.to_string(),
+        remedy,
+    })?;
+    Ok(material)
+}
+
+fn compare(args: &BtfCompareArgs, observer: &dyn Observer) -> Result<Answer, Error> {
+    let mut stages = Stages::new(observer);
+    let btf = read(&args.data, &mut stages)?;
+    let report = args.output.as_deref().map(OutputFolder::create).transpose()?;
+    let codecs = if args.codecs.is_empty() { CodecKind::ALL.to_vec() } else { args.codecs.clone() };
+    let options =
+        CompareOptions { codecs, ratios: args.ratios.clone(), precision: args.precision.into(), seed: args.seed };
+    let comparison = compare_codecs(btf, &options, report.as_ref(), &mut stages)?;
+    let mut words = text(&comparison);
+    if let Some(report) = report {
+        report.write("report.json", format!("{:#}\n", json!(comparison)).as_bytes())?;
+        report.write("report.html", html(&comparison, &report)?.as_bytes())?;
+        report.finish()?;
+        let path = args.output.as_deref().unwrap_or(Path::new(".")).join("report.html");
+        words.push_str(&format!("\nreport: {}\n", path.display()));
+    }
+    Ok(Answer { text: words, json: json!(comparison) })
 }

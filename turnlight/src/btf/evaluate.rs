@@ -1,0 +1,81 @@
+//! One material against the data it was fitted to.
+
+use super::speed::{Speed, speed};
+use crate::Error;
+use crate::stages::peak_bytes;
+use capture::btf::Btf;
+use serde::Serialize;
+use texture::btf::{Answer, Material, Part, Score, Synthesized, score, to_coded_range};
+
+/// What is known of a coded material.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Evaluation {
+    /// The codec's name.
+    pub codec: &'static str,
+    /// Of the file.
+    pub bytes: u64,
+    /// Of its parts.
+    pub parts: Vec<Part>,
+    /// Raw bytes, 8 bits a sample or 12, over all bytes of the file.
+    pub ratio: f64,
+    /// As the codec's authors counted, where that is known.
+    pub ratio_as_printed: Option<f64>,
+    /// Sample by sample.
+    #[serde(flatten)]
+    pub score: Score,
+    /// Answers per second; of codecs that are asked sample by sample.
+    #[serde(flatten)]
+    pub speed: Option<Speed>,
+    /// Of the fit, where it was timed.
+    pub fit_s: Option<f64>,
+    /// The most memory the process has held.
+    pub peak_bytes: Option<u64>,
+}
+
+/// Judges `material` by `btf`, the data as read; `seed` draws what is asked for timing, and synthesizes.
+///
+/// # Errors
+/// Where the material was fitted to data of another size or other directions.
+pub fn evaluate(material: &Material, btf: Btf, seed: u64) -> Result<Evaluation, Error> {
+    let frame = material.codec.frame();
+    let asked = (btf.width, btf.height, btf.views.len(), btf.lights.len());
+    let held = (frame.width, frame.height, frame.views.len(), frame.lights.len());
+    if asked != held {
+        let say = |(w, h, v, l): (usize, usize, usize, usize)| format!("{w} × {h} texels, {v} views, {l} lights");
+        let fault = format!("the material was fitted to {}, the data have {}", say(held), say(asked));
+        return Err(Error::Arguments(format!("{fault}; give the data and --crop it was fitted with")));
+    }
+    let btf = as_coded(material, btf);
+    Ok(judge(material, &btf, seed))
+}
+
+/// The data encoded as the material is.
+fn as_coded(material: &Material, btf: Btf) -> Btf {
+    if matches!(material.encoding, capture::btf::Encoding::Log { .. }) {
+        return btf.encoded(material.encoding);
+    }
+    to_coded_range(btf)
+}
+
+/// As [`evaluate`], of data known to fit and encoded as the codec saw them.
+pub(super) fn judge(material: &Material, btf: &Btf, seed: u64) -> Evaluation {
+    let (bytes, parts) = material.to_bytes();
+    let ratio = |bytes: u64| material.raw_bytes as f64 / bytes as f64;
+    let (score, speed) = match material.codec.answer() {
+        Answer::Sampler(sampler) => (score(btf, sampler), Some(speed(sampler, seed))),
+        Answer::Synthesizer(synthesizer) => {
+            (score(btf, &Synthesized::new(synthesizer, [btf.width, btf.height], seed)), None)
+        }
+    };
+    Evaluation {
+        codec: material.codec.kind().name(),
+        bytes: bytes.len() as u64,
+        parts,
+        ratio: ratio(bytes.len() as u64),
+        ratio_as_printed: None,
+        score,
+        speed,
+        fit_s: None,
+        peak_bytes: peak_bytes(),
+    }
+}

@@ -1,0 +1,15 @@
+//! Coded materials judged: size, error and speed of one ([`evaluate`]), and of all codecs side by side
+//! ([`compare`]).
+
+mod compare;
+mod evaluate;
+mod page;
+mod plot;
+mod sheet;
+mod speed;
+
+pub use compare::{CodecComparison, CodecRun, CompareOptions, compare, text};
+pub use evaluate::{Evaluation, evaluate};
+pub use page::html;
+pub use sheet::{DIFFERENCE_GAIN, sheet};
+pub use speed::{Speed, speed};

@@ -1,0 +1,103 @@
+//! Error against size, and against time.
+
+use super::{CodecComparison, Evaluation};
+use crate::Error;
+use plotters::coord::combinators::IntoLogRange;
+use plotters::prelude::*;
+
+/// Told apart by the colour-blind too (Okabe and Ito, 2008), then again with hollow marks.
+const COLORS: [RGBColor; 7] = [
+    RGBColor(230, 159, 0),
+    RGBColor(86, 180, 233),
+    RGBColor(0, 158, 115),
+    RGBColor(204, 121, 167),
+    RGBColor(213, 94, 0),
+    RGBColor(0, 114, 178),
+    RGBColor(90, 90, 90),
+];
+
+/// What stands along the horizontal axis.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Axis {
+    /// Bytes of the file over texels.
+    BytesPerTexel,
+    /// Nanoseconds of one core for an answer.
+    NanosecondsPerAnswer,
+}
+
+/// RMSE over an axis, both logarithmic, one curve per codec, as an SVG document.
+///
+/// # Errors
+/// Where the plotting library fails.
+pub(super) fn error_over(comparison: &CodecComparison, axis: Axis) -> Result<String, Error> {
+    let mut svg = String::new();
+    draw(comparison, axis, &mut svg).map_err(|fault| Error::Failed(format!("the plot cannot be drawn: {fault}")))?;
+    Ok(svg)
+}
+
+impl Axis {
+    fn of(self, evaluation: &Evaluation, texels: usize) -> Option<f64> {
+        match self {
+            Self::BytesPerTexel => Some(evaluation.bytes as f64 / texels as f64),
+            Self::NanosecondsPerAnswer => evaluation.speed.map(|speed| 1e9 / speed.evals_per_s_core),
+        }
+    }
+
+    fn label(self) -> &'static str {
+        match self {
+            Self::BytesPerTexel => "bytes per texel",
+            Self::NanosecondsPerAnswer => "nanoseconds per answer, one core",
+        }
+    }
+}
+
+/// One curve.
+struct Curve {
+    name: &'static str,
+    points: Vec<(f64, f64)>,
+}
+
+fn curves(comparison: &CodecComparison, axis: Axis) -> Vec<Curve> {
+    let texels = comparison.size[0] * comparison.size[1];
+    let mut curves: Vec<Curve> = Vec::new();
+    for run in &comparison.runs {
+        let Some(evaluation) = &run.evaluation else { continue };
+        let Some(x) = axis.of(evaluation, texels) else { continue };
+        let point = (x, evaluation.score.rmse.max(0.01));
+        match curves.iter_mut().find(|curve| curve.name == run.name) {
+            Some(curve) => curve.points.push(point),
+            None => curves.push(Curve { name: run.name, points: vec![point] }),
+        }
+    }
+    curves
+}
+
+fn draw(comparison: &CodecComparison, axis: Axis, svg: &mut String) -> Result<(), Box<dyn std::error::Error>> {
+    let curves = curves(comparison, axis);
+    let range = |of: fn(&(f64, f64)) -> f64| {
+        let values = curves.iter().flat_map(|c| c.points.iter().map(of));
+        let (low, high) = values.fold((f64::MAX, f64::MIN), |(low, high), v| (low.min(v), high.max(v)));
+        if low > high { 1.0..10.0 } else { low / 1.3..high * 1.3 }
+    };
+    let root = SVGBackend::with_string(svg, (960, 420)).into_drawing_area();
+    root.fill(&WHITE)?;
+    let mut chart = ChartBuilder::on(&root)
+        .margin(10)
+        .x_label_area_size(36)
+        .y_label_area_size(56)
+        .build_cartesian_2d(range(|p| p.0).log_scale(), range(|p| p.1).log_scale())?;
+    chart.configure_mesh().x_desc(axis.label()).y_desc("RMSE, levels of 255").draw()?;
+    for (i, curve) in curves.iter().enumerate() {
+        let color = COLORS[i % COLORS.len()];
+        let style = if i < COLORS.len() { color.filled() } else { color.stroke_width(2) };
+        chart.draw_series(LineSeries::new(curve.points.iter().copied(), color.stroke_width(2)))?;
+        chart
+            .draw_series(curve.points.iter().map(|&p| Circle::new(p, 4, style)))?
+            .label(curve.name)
+            .legend(move |(x, y)| Circle::new((x + 8, y), 4, style));
+    }
+    chart.configure_series_labels().background_style(WHITE.mix(0.8)).border_style(BLACK.mix(0.3)).draw()?;
+    drop(chart);
+    root.present()?;
+    Ok(())
+}
