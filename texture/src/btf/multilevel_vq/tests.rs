@@ -250,7 +250,7 @@ fn a_threshold_of_0_loses_what_the_grid_loses() {
         ..options(&btf, Aim::Threshold(0.0), Precision::Full)
     };
     let (codec, _) = fit(&btf, &exact).unwrap();
-    assert!(rmse(&btf, &codec) < 0.35, "{}", rmse(&btf, &codec));
+    assert!(rmse(&btf, &codec) < 0.7, "{}", rmse(&btf, &codec));
 }
 
 #[test]
@@ -327,7 +327,7 @@ fn smaller_sizes_average_radiance() {
 fn a_brdf_is_a_material_of_one_texel() {
     let btf = striped(1, &bonn_directions());
     let codec = fitted(&btf, 1.0, Precision::Compact);
-    assert!(rmse(&btf, &codec) < 3.0, "{}", rmse(&btf, &codec));
+    assert!(rmse(&btf, &codec) < 4.0, "{}", rmse(&btf, &codec));
 }
 
 #[test]
