@@ -22,6 +22,7 @@ pub mod choose;
 pub mod contour;
 pub mod doctor;
 mod error;
+mod exif;
 pub mod footage;
 mod formats;
 mod image;
@@ -33,6 +34,7 @@ mod pixels;
 #[cfg(feature = "video")]
 mod saddle;
 pub mod silhouette;
+pub mod srgb;
 pub mod turntable;
 #[cfg(feature = "video")]
 pub mod video;

@@ -34,15 +34,6 @@ pub struct ShadingSample {
     pub brightness: f64,
 }
 
-/// On what surface the shading was sampled.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ShadedSurface {
-    /// The platter or the board: level, so that far light shades it alike at every angle.
-    Level,
-    /// The object, with points that face all sides (level ones left out).
-    AllAround,
-}
-
 /// What the light is fixed to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -88,6 +79,81 @@ pub fn ball_from_outline(camera: &Camera, outline: &[Point2<f64>]) -> Option<Bal
     let is_cone = rays.len() >= 3 && cos.is_finite() && cos > 0.0 && cos < 1.0;
     let direction = axis.try_normalize(1e-12)?;
     is_cone.then(|| Ball { center: camera.center() + direction, radius: (1.0 - cos * cos).sqrt() })
+}
+
+/// Directions in which an outline is looked for from its middle.
+const RAYS: usize = 64;
+/// How far the middle and the radius of an outline may be from where they are said to be, in parts of the radius.
+const OUTLINE_OFF: f64 = 0.15;
+/// A rim counts no more than this many levels a pixel: highlights shall not draw it.
+const RIM_CAP: f64 = 20.0;
+/// A rim of fewer levels a pixel, in the mean, is none.
+const LEAST_RIM: f64 = 4.0;
+/// Seen aside, the outline is no circle: its points lie within so many pixels of one.
+const OVAL_PX: f64 = 2.0;
+
+/// Points of the outline of a ball near a circle `[x, y, radius]` (pixels) drawn by hand: the circle across which most
+/// changes (the integro-differential operator of Daugman: High confidence visual recognition of persons by a test of
+/// statistical independence, PAMI 15(11), 1993), and on each ray from its middle the steepest place nearby. `None` where
+/// nothing round stands out there.
+pub fn outline_near(image: &Image<[u8; 3]>, drawn: [f64; 3]) -> Option<Vec<Point2<f64>>> {
+    let luma = image.map(|p| p.map(f64::from).iter().sum::<f64>() / 3.0);
+    let reach = OUTLINE_OFF * drawn[2];
+    let mut step = (0.5 * reach).clamp(0.25, 1.5);
+    let mut best = drawn;
+    let mut radius = (reach / step).ceil() as i32;
+    while step > 0.1 {
+        best = around(best, step, radius).max_by(|a, b| rim(&luma, a).total_cmp(&rim(&luma, b)))?;
+        (step, radius) = (0.5 * step, 1);
+    }
+    if rim(&luma, &best) < LEAST_RIM {
+        return None;
+    }
+    let points: Vec<Point2<f64>> = (0..RAYS).filter_map(|ray| steepest(&luma, &best, ray)).collect();
+    (2 * points.len() > RAYS).then_some(points)
+}
+
+/// Circles about one, in steps, to each side in middle and radius.
+fn around([x, y, r]: [f64; 3], step: f64, radius: i32) -> impl Iterator<Item = [f64; 3]> {
+    let steps = move || (-radius..=radius).map(move |k| f64::from(k) * step);
+    let moved = move |dx: f64| steps().flat_map(move |dy| steps().map(move |dr| [x + dx, y + dy, r + dr]));
+    steps().flat_map(moved)
+}
+
+/// How much changes across a circle, in levels a pixel, the mean of all rays.
+fn rim(luma: &Image<f64>, circle: &[f64; 3]) -> f64 {
+    (0..RAYS).map(|ray| slope(luma, circle, ray, 0.0).abs().min(RIM_CAP)).sum::<f64>() / RAYS as f64
+}
+
+/// On a ray of a circle, `off` pixels beyond it.
+fn on_ray([x, y, r]: &[f64; 3], ray: usize, off: f64) -> Point2<f64> {
+    let angle = std::f64::consts::TAU * ray as f64 / RAYS as f64;
+    Point2::new(x + (r + off) * angle.cos(), y + (r + off) * angle.sin())
+}
+
+/// Levels a pixel, outwards.
+fn slope(luma: &Image<f64>, circle: &[f64; 3], ray: usize, off: f64) -> f64 {
+    let level = |off: f64| {
+        let p = on_ray(circle, ray, off) - nalgebra::Vector2::repeat(0.5);
+        let (x, y) = (p.x.floor(), p.y.floor());
+        let at = |dx: isize, dy: isize| luma.at_clamped(x as isize + dx, y as isize + dy);
+        let row = |dy: isize| at(0, dy) + (at(1, dy) - at(0, dy)) * (p.x - x);
+        row(0) + (row(1) - row(0)) * (p.y - y)
+    };
+    0.5 * (level(off + 1.0) - level(off - 1.0))
+}
+
+/// Where a ray crosses the outline: the middle of the slope around its steepest place.
+fn steepest(luma: &Image<f64>, circle: &[f64; 3], ray: usize) -> Option<Point2<f64>> {
+    let at = |off: f64| (off, slope(luma, circle, ray, off).abs());
+    let all = (-8..=8).map(|k| at(OVAL_PX * f64::from(k) / 8.0));
+    let (peak, most) = all.max_by(|a, b| a.1.total_cmp(&b.1))?;
+    if most < LEAST_RIM {
+        return None;
+    }
+    let near: Vec<(f64, f64)> = (-4..=4).map(|k| at(peak + 0.25 * f64::from(k))).collect();
+    let total: f64 = near.iter().map(|(_, slope)| slope).sum();
+    Some(on_ray(circle, ray, near.iter().map(|(off, slope)| off * slope).sum::<f64>() / total))
 }
 
 /// Unit direction towards the light, in the world, that the ball mirrors at `highlight` (pixels): `2 (n·v) n − v` with
@@ -171,9 +237,7 @@ const MIN_SAMPLES: usize = 6;
 /// Fewer points than this decide nothing.
 const MIN_POINTS: usize = 8;
 /// Matt surfaces under lamps of a room follow the turn by at least this much, seen from all sides…
-const ROOM_AROUND: f64 = 0.06;
-/// …and level ones, where lamps are near, by this much…
-const ROOM_LEVEL: f64 = 0.03;
+const ROOM: f64 = 0.06;
 /// …and by this many times what else changes them: texture that slides under the points does both.
 const ROOM_RATIO: f64 = 1.3;
 /// Light that turns along leaves less than this.
@@ -183,20 +247,24 @@ const EVENING_ROUNDS: usize = 30;
 /// Least determinant of the mean normal matrix of `(1, cos θ, sin θ)`, that of 30°: shorter arcs fix no harmonic.
 const MIN_DETERMINANT: f64 = 2e-6;
 
-/// Judges from shading whether the light turns with the object, whatever the exposure of each frame. Samples that are not finite or not positive are left out.
-pub fn judge_light(samples: &[ShadingSample], surface: ShadedSurface) -> LightCheck {
+/// Judges from shading whether the light turns with the object, whatever the exposure of each frame. The points face all
+/// sides, level ones left out: far light shades those alike at every angle. Samples that are not finite or not positive
+/// are left out.
+pub fn judge_light(samples: &[ShadingSample]) -> LightCheck {
     let is_sound = |s: &&ShadingSample| s.brightness.is_finite() && s.brightness > 0.0 && s.angle.is_finite();
     let sound: Vec<ShadingSample> = samples.iter().filter(is_sound).copied().collect();
     let relative = evened(sound);
     let fits: Vec<[f64; 2]> = by_point(&relative).values().filter_map(|of_point| fit_harmonic(of_point)).collect();
     let middle = |k: usize| median(fits.iter().map(|fit| fit[k]).collect()).unwrap_or(0.0);
     let (modulation, residual) = (middle(0), middle(1));
-    let kind = match surface {
-        _ if fits.len() < MIN_POINTS => LightKind::Undetermined,
-        ShadedSurface::AllAround if modulation > ROOM_AROUND && modulation > ROOM_RATIO * residual => LightKind::Room,
-        ShadedSurface::AllAround if modulation < OBJECT => LightKind::Object,
-        ShadedSurface::Level if modulation > ROOM_LEVEL && modulation > ROOM_RATIO * residual => LightKind::Room,
-        _ => LightKind::Undetermined,
+    let kind = if fits.len() < MIN_POINTS {
+        LightKind::Undetermined
+    } else if modulation > ROOM && modulation > ROOM_RATIO * residual {
+        LightKind::Room
+    } else if modulation < OBJECT {
+        LightKind::Object
+    } else {
+        LightKind::Undetermined
     };
     LightCheck { kind, modulation, residual, points: fits.len() }
 }
@@ -285,9 +353,8 @@ mod tests {
                     .filter_map(|k| light_from_highlight(&camera, &ball, at(k)))
                     .map(|d| if d.angle(&light) < 4.0_f64.to_radians() { 255.0 } else { 60.0 })
                     .collect();
-                if hits.len() == 16 {
-                    image.set(x, y, [(hits.iter().sum::<f64>() / 16.0) as u8; 3]);
-                }
+                let ground = 110.0 * (16 - hits.len()) as f64;
+                image.set(x, y, [((hits.iter().sum::<f64>() + ground) / 16.0) as u8; 3]);
                 cover.set(x, y, (hits.len() * 255 / 16) as u8);
             }
         }
@@ -303,6 +370,24 @@ mod tests {
         let distance = (truth.center - eye).norm();
         assert!((found.center - eye).angle(&(truth.center - eye)) < 2e-4);
         assert!((found.radius - truth.radius / distance).abs() < 3e-4, "{}", found.radius);
+    }
+
+    #[test]
+    fn an_outline_drawn_by_hand_is_drawn_to_the_ball() {
+        let (image, _) = picture((camera().center() - ball().center).normalize() + Vector3::new(0.3, 0.8, 0.1));
+        let middle = camera().project(&ball().center).unwrap().pixel;
+        let (eye, truth) = (camera().center(), ball());
+        // 34 pixels, drawn two to four off.
+        for [dx, dy, dr] in [[0.0, 0.0, 0.0], [3.0, -2.0, 2.0], [-3.5, 3.0, -3.0]] {
+            let outline = outline_near(&image, [middle.x + dx, middle.y + dy, 34.0 + dr]).unwrap();
+            let found = ball_from_outline(&camera(), &outline).unwrap();
+            let off = (found.center - eye).angle(&(truth.center - eye));
+            // A third of a pixel is 1e-3.
+            assert!(off < 1e-3, "{off}");
+            assert!((found.radius - truth.radius / (truth.center - eye).norm()).abs() < 1e-3, "{}", found.radius);
+        }
+        assert_eq!(outline_near(&Image::filled(320, 240, [90; 3]), [160.0, 120.0, 30.0]), None);
+        assert_eq!(outline_near(&image, [20.0, 20.0, 12.0]), None);
     }
 
     #[test]
@@ -357,23 +442,16 @@ mod tests {
 
     #[test]
     fn light_in_the_room_changes_what_turns() {
-        let check = judge_light(&shading(4.0, false), ShadedSurface::AllAround);
+        let check = judge_light(&shading(4.0, false));
         assert_eq!(check.kind, LightKind::Room, "{check:?}");
         assert!(check.modulation > 0.15, "{check:?}");
     }
 
     #[test]
     fn light_that_turns_along_changes_nothing_even_if_exposure_drifts() {
-        let check = judge_light(&shading(4.0, true), ShadedSurface::AllAround);
+        let check = judge_light(&shading(4.0, true));
         assert_eq!(check.kind, LightKind::Object, "{check:?}");
         assert!(check.modulation < 0.01, "{check:?}");
-    }
-
-    #[test]
-    fn a_level_platter_alone_cannot_tell_far_light() {
-        for turns_along in [true, false] {
-            assert_eq!(judge_light(&shading(0.0, turns_along), ShadedSurface::Level).kind, LightKind::Undetermined);
-        }
     }
 
     #[test]
@@ -382,7 +460,7 @@ mod tests {
         let broken = ShadingSample { brightness: f64::NAN, ..same };
         let dark = ShadingSample { brightness: 0.0, ..same };
         for samples in [vec![], vec![same; 50], vec![broken; 50], vec![dark; 50]] {
-            let check = judge_light(&samples, ShadedSurface::AllAround);
+            let check = judge_light(&samples);
             assert_eq!((check.kind, check.points), (LightKind::Undetermined, 0));
         }
     }

@@ -1,6 +1,6 @@
 //! Image files in and out: 8-bit colour, mattes, and the errors that name the file.
 
-use crate::{CaptureError, Image};
+use crate::{CaptureError, Image, exif};
 use ::image::metadata::Orientation;
 use ::image::{DynamicImage, ImageDecoder, ImageError, ImageReader};
 use std::path::Path;
@@ -9,6 +9,12 @@ use std::path::Path;
 pub(crate) fn size_of(path: &Path) -> Result<(usize, usize), CaptureError> {
     let (width, height) = reader(path)?.into_dimensions().map_err(|error| fault(path, error))?;
     Ok((width as usize, height as usize))
+}
+
+/// The focal length in pixels that the camera noted in the file, for a picture of this size; unreadable files say nothing.
+pub(crate) fn noted_focal_px(path: &Path, size: [usize; 2]) -> Option<f64> {
+    let notes = reader(path).ok()?.into_decoder().ok()?.exif_metadata().ok()??;
+    exif::focal_px(&notes, size)
 }
 
 /// Whether the file has an alpha channel and some pixel of it is not opaque. Unreadable files have none.

@@ -114,15 +114,15 @@ fn equations(pixels: &[(Point2<f64>, f64)], p: &Parameters) -> (SMatrix<f64, 7, 
 }
 
 /// A blurred step from −1 to 1 and its derivatives.
-struct Edge {
-    level: f64,
-    slope: f64,
-    by_sharpness: f64,
+pub(crate) struct Edge {
+    pub(crate) level: f64,
+    pub(crate) slope: f64,
+    pub(crate) by_sharpness: f64,
 }
 
 /// The mean of `tanh(κ d)` over a pixel, `(ln cosh κ(d + ½) − ln cosh κ(d − ½)) / κ`, at the distance `d` of its centre
 /// from the line. It becomes the ramp of exact coverage as `κ` grows.
-fn edge(d: f64, sharp: f64) -> Edge {
+pub(crate) fn edge(d: f64, sharp: f64) -> Edge {
     let log_cosh = |x: f64| x.abs() + (-2.0 * x.abs()).exp().ln_1p();
     let (near, far) = (d - 0.5, d + 0.5);
     let (from, to) = ((sharp * near).tanh(), (sharp * far).tanh());

@@ -384,7 +384,7 @@ fn standard_error(batches: &[Vec3], met: &[u32], share: f32) -> Option<f32> {
 /// Linear radiance to the sRGB scale 0..=255 (IEC 61966-2-1).
 pub(crate) fn encode(linear: f32) -> f32 {
     let c = linear.clamp(0.0, 1.0);
-    255.0 * if c <= 0.003_130_8 { 12.92 * c } else { 1.055 * c.powf(1.0 / 2.4) - 0.055 }
+    255.0 * capture::srgb::encoded(f64::from(c)) as f32
 }
 
 #[cfg(test)]

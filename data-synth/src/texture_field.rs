@@ -57,10 +57,7 @@ pub(crate) fn wrap(x: f32, period: f32) -> f32 {
 
 /// Linear RGB of an 8-bit sRGB colour as painters name it.
 pub(crate) fn color(srgb: [u8; 3]) -> Vec3 {
-    Vec3::from(srgb.map(|c| {
-        let c = f32::from(c) / 255.0;
-        if c <= 0.04045 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) }
-    }))
+    Vec3::from(srgb.map(|c| capture::srgb::linear(f64::from(c) / 255.0) as f32))
 }
 
 /// Mixes two colours.

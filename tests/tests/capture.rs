@@ -325,3 +325,112 @@ fn masks_and_cameras_from_elsewhere_go_by_name() {
     let run = turnlight(folder.path(), &args);
     assert!(run.code == Some(1) && run.stderr.contains("0007.png"), "{}", run.stderr);
 }
+
+/// Where box `name` of an .mp4 starts, inside the boxes before it (ISO 14496-12).
+fn find_box(bytes: &[u8], names: &[&[u8; 4]]) -> usize {
+    let (mut at, mut end) = (0, bytes.len());
+    for (depth, name) in names.iter().enumerate() {
+        at += if depth > 0 { 8 } else { 0 };
+        loop {
+            assert!(at < end, "no {}", String::from_utf8_lossy(*name));
+            let size = u32::from_be_bytes(bytes[at..at + 4].try_into().expect("four bytes")) as usize;
+            if &bytes[at + 4..at + 8] == *name {
+                end = at + size;
+                break;
+            }
+            at += size;
+        }
+    }
+    at
+}
+
+#[test]
+fn a_film_taken_with_the_phone_upright_becomes_upright_views() {
+    let cartoon = Cartoon { size: [480, 640], elevation_deg: 35.0, ..Cartoon::default() };
+    let drawn = draw(&cartoon, &angles(16, 0.95));
+    // The sensor lies on its side: the film's pixel (x, y) is shown at (479 − y, x).
+    let lying = |upright: &Image<[u8; 3]>| {
+        let pixels = (0..480).flat_map(|y| (0..640).map(move |x| upright.at(479 - y, x))).collect();
+        Image::from_pixels(640, 480, pixels).expect("a picture")
+    };
+    let (folder, path) = film_of(&drawn.iter().map(|frame| lying(&frame.image)).collect::<Vec<_>>());
+    let mut bytes = std::fs::read(&path).expect("a film");
+    // The matrix [a b u c d v x y w] of the track's head, 40 bytes into its body.
+    let matrix = find_box(&bytes, &[b"moov", b"trak", b"tkhd"]) + 8 + 40;
+    for (position, value) in [(0, 0), (1, 1 << 16), (3, -1 << 16), (4, 0_i32)] {
+        bytes[matrix + 4 * position..][..4].copy_from_slice(&value.to_be_bytes());
+    }
+    std::fs::write(&path, bytes).expect("written");
+    let run = turnlight(folder.path(), &["capture", "film.mp4", "--frames", "10", "-o", "capture"]);
+    assert_eq!(run.code, Some(0), "{}", run.stderr);
+    let capture = capture::Capture::read(&folder.path().join("capture")).expect("a capture");
+    let sizes = capture.frames.iter().map(|f| [f.camera.intrinsics.width, f.camera.intrinsics.height]);
+    assert!(
+        capture.frames.len() >= 8 && sizes.clone().all(|size| size == [480, 640]),
+        "{:?}",
+        sizes.collect::<Vec<_>>()
+    );
+    // Upright, the camera looks down: the axis of the table runs from the bottom of the picture to its top.
+    assert!(capture.frames.iter().all(|f| f.camera.rotation[(1, 2)] < -0.7), "{}", capture.frames[0].camera.rotation);
+}
+
+/// Sets the times of the frames of an .mkv in milliseconds: each block has 16 bits for its time since its cluster's
+/// (RFC 9559).
+fn set_times(film: &mut [u8], times_ms: &[i64]) {
+    // An element's number and the size of its body are as long as the zeros before their first bit say.
+    let length = |byte: u8| byte.leading_zeros() as usize + 1;
+    let (mut at, mut cluster, mut block) = (0, 0, 0);
+    while at < film.len() {
+        let id = &film[at..at + length(film[at])];
+        let body = at + id.len() + length(film[at + id.len()]);
+        let size = film[at + id.len()..body].iter().fold(0, |sum, &byte| sum << 8 | u64::from(byte));
+        let size = size & ((1 << (7 * (body - at - id.len()))) - 1);
+        match id {
+            // Segment and cluster: what is in them comes next.
+            [0x18, 0x53, 0x80, 0x67] | [0x1f, 0x43, 0xb6, 0x75] => at = body,
+            [0xe7] => {
+                cluster = film[body..body + size as usize].iter().fold(0, |sum, &byte| sum << 8 | i64::from(byte));
+                at = body + size as usize;
+            }
+            [0xa3] => {
+                let relative = i16::try_from(times_ms[block] - cluster).expect("near its cluster");
+                film[body + 1..body + 3].copy_from_slice(&relative.to_be_bytes());
+                block += 1;
+                at = body + size as usize;
+            }
+            _ => at = body + size as usize,
+        }
+    }
+    assert_eq!(block, times_ms.len(), "blocks");
+}
+
+#[test]
+fn frames_without_the_board_are_placed_by_their_times_whatever_the_rate() {
+    let cartoon = Cartoon::default();
+    // A phone in the dark: one, two or three thirtieths of a second from frame to frame.
+    let steps = [33, 100, 67, 33, 33, 100, 100, 67];
+    let times: Vec<i64> = (0..32).scan(0, |at, k| Some(std::mem::replace(at, *at + steps[k % steps.len()]))).collect();
+    let turned: Vec<f64> = times.iter().map(|&ms| 0.95 * TAU * ms as f64 / times[31] as f64).collect();
+    let mut frames = images(&draw(&cartoon, &turned));
+    let without = [6, 13, 22];
+    for k in without {
+        frames[k] = Image::filled(640, 480, [90, 80, 70]);
+    }
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("film.mkv");
+    write_film(&path, &frames);
+    let mut bytes = std::fs::read(&path).expect("a film");
+    set_times(&mut bytes, &times);
+    std::fs::write(&path, bytes).expect("written");
+    let found =
+        captured(&path, &FootageOptions { board: Some(cartoon.board), most: Some(8), ..FootageOptions::default() });
+    let shots = &found.shots.shots;
+    assert_eq!(shots.len(), times.len());
+    for (shot, (&time, truth)) in shots.iter().zip(times.iter().zip(&turned)) {
+        assert!((shot.source.time_s - time as f64 / 1e3).abs() < 2e-3, "{} {time}", shot.source.time_s);
+        let off = (shot.angle.expect("an angle") - truth).to_degrees().abs();
+        // By the frames' numbers those without the board would be off by up to five degrees.
+        assert!(off < 0.5, "{}: off by {off}°", shot.source.name);
+    }
+    assert!(without.iter().all(|&k| shots[k].corners == 0 && shots[k].angle_deviation.is_some()));
+}

@@ -338,7 +338,8 @@ pub(crate) struct CaptureFootageArgs {
     /// Picture of the set without object and table, one for every film or folder
     #[arg(long, value_name = "IMAGE")]
     pub(crate) clean_plate: Vec<PathBuf>,
-    /// Outline of a shiny ball that stands in the room, in pixels: its highlight shows where the light is
+    /// Outline of a shiny ball that stands in the room, in pixels, to a tenth of its radius: its highlight shows where the
+    /// light is
     #[arg(long, value_name = "X,Y,RADIUS", value_parser = circle)]
     pub(crate) light_ball: Option<[f64; 3]>,
     /// Frames to keep at most [default: 72 a turn]
@@ -603,7 +604,8 @@ pub(crate) struct TurntableArgs {
     /// The table turned by this angle from photograph to photograph, in degrees
     #[arg(long, value_name = "DEG", group = "turn", value_parser = step, allow_negative_numbers = true)]
     pub(crate) step: Option<f64>,
-    /// A text file with the angle of each photograph in degrees, one a line
+    /// A text file with the angle of each photograph in degrees, one a line: in the order of their names, or after the
+    /// name of the photograph (`IMG_0012.jpg 37.5`), in any order
     #[arg(long, value_name = "FILE", group = "turn")]
     pub(crate) angles: Option<PathBuf>,
 }

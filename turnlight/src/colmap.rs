@@ -5,7 +5,7 @@
 use crate::Error;
 use crate::stages::Stages;
 use capture::footage::read_upright;
-use capture::{Camera, Capture, Image, Intrinsics, read_rgb, write_matte, write_rgb};
+use capture::{Camera, Capture, Intrinsics, read_matte, read_rgb, write_matte, write_rgb};
 use std::fs;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
@@ -26,8 +26,9 @@ pub struct ColmapOptions {
 pub struct Photograph {
     /// The image file.
     pub image: PathBuf,
-    /// Where the object is (from 128 on), of the size of the image held upright; everywhere if `None`.
-    pub matte: Option<Image<u8>>,
+    /// A mask of where the object is, of the size of the image held upright; everywhere if `None`. Read when its turn
+    /// comes: masks of many photographs need not fit into memory.
+    pub mask: Option<PathBuf>,
 }
 
 /// What COLMAP found.
@@ -78,9 +79,9 @@ fn stage(photographs: &[Photograph], place: &Path) -> Result<Vec<String>, Error>
     let mut names = Vec::with_capacity(photographs.len());
     for (i, photograph) in photographs.iter().enumerate() {
         let name = lay(&photograph.image, &images, i)?;
-        if let Some(matte) = &photograph.matte {
+        if let Some(mask) = &photograph.mask {
             // COLMAP takes whatever is not zero.
-            let mask = matte.map(|v| if v >= 128 { 255 } else { 0 });
+            let mask = read_matte(mask)?.map(|v| if v >= 128 { 255 } else { 0 });
             write_matte(&masks.join(format!("{name}.png")), &mask)?;
         }
         names.push(name);
@@ -227,7 +228,7 @@ fn cannot(path: &Path, fault: &std::io::Error) -> Error {
 mod tests {
     use super::*;
     use crate::stages::Silent;
-    use capture::Distortion;
+    use capture::{Distortion, Image};
     use std::os::unix::fs::PermissionsExt;
 
     /// A program in the place of COLMAP that writes down how it was called, and does what `mapper` says.
@@ -251,7 +252,9 @@ mod tests {
         let photograph = |i| {
             let image = folder.join(format!("shot {i}.png"));
             write_rgb(&image, &Image::filled(8, 6, [5; 3])).unwrap();
-            Photograph { image, matte: Some(Image::filled(8, 6, 200)) }
+            let mask = folder.join(format!("mask {i}.png"));
+            write_matte(&mask, &Image::filled(8, 6, 200)).unwrap();
+            Photograph { image, mask: Some(mask) }
         };
         (0..count).map(photograph).collect()
     }
@@ -304,7 +307,7 @@ mod tests {
         let exif = *b"\0\0\0\x1aeXIfMM\0\x2a\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0\x06\0\0\0\0\0\0\xd6gKi";
         bytes.splice(33..33, exif);
         fs::write(place("held.png"), bytes).unwrap();
-        let shots = ["link.png", "held.png"].map(|name| Photograph { image: place(name), matte: None });
+        let shots = ["link.png", "held.png"].map(|name| Photograph { image: place(name), mask: None });
         assert_eq!(stage(&shots, folder.path()).unwrap(), ["000000.png", "000001.png"]);
         let laid = |name: &str| place("images").join(name);
         assert!(fs::symlink_metadata(laid("000000.png")).unwrap().is_file());

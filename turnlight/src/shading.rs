@@ -1,7 +1,7 @@
 //! Brightness of points on the object over a turn, for [`capture::light::judge_light`] to judge the light by.
 
-use capture::View;
 use capture::light::ShadingSample;
+use capture::{View, srgb};
 use geometry::Mesh;
 use geometry::depth::DepthMap;
 use nalgebra::{Point3, Vector3};
@@ -75,10 +75,9 @@ fn brightness(view: &View, depth: &DepthMap, probe: &Probe) -> Option<f64> {
     Some(sum / ((2 * REACH + 1) * (2 * REACH + 1)) as f64)
 }
 
-/// Linear light of an sRGB level (IEC 61966-2-1).
+/// Linear light of an sRGB level.
 fn linear(level: u8) -> f64 {
-    let v = f64::from(level) / 255.0;
-    if v <= 0.04045 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) }
+    srgb::linear(f64::from(level) / 255.0)
 }
 
 #[cfg(test)]

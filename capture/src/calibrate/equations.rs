@@ -10,7 +10,7 @@ use nalgebra::{Cholesky, DMatrix, DVector, Isometry3, Matrix3, UnitQuaternion, V
 
 /// What a corner counts that the rig puts out of sight, in pixels.
 pub(super) const OUT_OF_SIGHT: f64 = 1e4;
-/// What a marker that is not flat may tilt, in radians, and rise, in sides: paper that curls.
+/// What a marker that is not flat (or the rim of a board) may tilt, in radians, and rise, in sides: paper that curls.
 const TILT: f64 = 0.2;
 const RISE: f64 = 0.3;
 
@@ -24,7 +24,7 @@ pub(super) struct Freedom<'a> {
 /// Where the parameters of the head are.
 pub(super) struct Head<'a> {
     lens: &'a [LensParameter],
-    axis: usize,
+    pub(super) axis: usize,
     segments: usize,
     markers: usize,
     pub(super) size: usize,
@@ -35,13 +35,14 @@ pub(super) struct Head<'a> {
 pub(super) struct Equations {
     head: DMatrix<f64>,
     gradient: DVector<f64>,
-    blocks: Vec<Block>,
+    pub(super) blocks: Vec<Block>,
     pub(super) cost: f64,
 }
 
-struct Block {
-    normal: DMatrix<f64>,
-    coupling: DMatrix<f64>,
+/// What belongs to one picture.
+pub(super) struct Block {
+    pub(super) normal: DMatrix<f64>,
+    pub(super) coupling: DMatrix<f64>,
     gradient: DVector<f64>,
 }
 
@@ -69,7 +70,7 @@ fn freedoms(is_flat: bool) -> &'static [usize] {
     if is_flat { &[2, 3, 4] } else { &[0, 1, 2, 3, 4, 5] }
 }
 
-/// What is assumed of one number of a marker that is not flat.
+/// What is assumed of one number of a marker that is not flat, or of a board that curls.
 struct Relief {
     /// Position in the head.
     at: usize,
@@ -78,8 +79,12 @@ struct Relief {
     weight: f64,
 }
 
-/// How far markers are out of their plane.
+/// How far markers are out of their plane, or how much a board curls.
 fn relief(shape: &Shape, head: &Head) -> Vec<Relief> {
+    if let Shape::Curled(curled) = shape {
+        let bend = |(i, &value): (usize, &f64)| Relief { at: head.markers + i, value, weight: curled.reach / TILT };
+        return curled.curvature.iter().enumerate().map(bend).collect();
+    }
     let Shape::Squares { side, places, fixed, is_flat: false } = shape else { return Vec::new() };
     let of = |(n, place): (usize, &Isometry3<f64>)| {
         let first = head.markers + 6 * (n - usize::from(n > *fixed));
@@ -128,6 +133,7 @@ impl<'a> Head<'a> {
         };
         let size = match &rig.shape {
             Shape::Points(_) => markers,
+            Shape::Curled(_) => markers + 3,
             Shape::Squares { places, is_flat, .. } => markers + freedoms(*is_flat).len() * (places.len() - 1),
         };
         Self { lens, axis, segments, markers, size, block }
@@ -329,6 +335,11 @@ impl<'a> View<'a> {
                 row.extend(freedoms.iter().enumerate().map(|(n, &i)| (first + n, by_place * by(i))));
             }
         }
+        if let Shape::Curled(curled) = &self.rig.shape {
+            let by_place = at.by_point * self.from_target;
+            let by_curvature = curled.by_curvature(corner.point);
+            row.extend(by_curvature.into_iter().enumerate().map(|(i, by)| (head.markers + i, by_place * by)));
+        }
         let residual = corner.pixel - at.pixel;
         if matches!(self.rig.poses, Poses::Free(_)) {
             return Some((residual, rigid));
@@ -370,6 +381,9 @@ pub(super) fn stepped(rig: &Rig, head: &Head, (first, rest): &(DVector<f64>, Vec
             }
             t.angles.iter_mut().zip(rest).for_each(|(angle, by)| *angle += by[0]);
         }
+    }
+    if let Shape::Curled(curled) = &mut next.shape {
+        curled.curvature.iter_mut().enumerate().for_each(|(i, value)| *value += at(head.markers + i));
     }
     if let Shape::Squares { places, fixed, is_flat, .. } = &mut next.shape {
         let freedoms = freedoms(*is_flat);

@@ -6,7 +6,7 @@ use super::equations::Freedom;
 use super::homography::{constraint_ratio, fit_robust, median};
 use super::lens::LensPrior;
 use super::pose::{Candidate, candidates, choose, plane_near, plane_of};
-use super::rig::{Corner, Picture, Poses, Rig, Shape, Turning};
+use super::rig::{Corner, Curled, Picture, Poses, Rig, Shape, Turning};
 use super::turntable::{
     axis, best_angle, canonical, initial, joined, largest_turn, likeliest_move, starts, world_from_target,
 };
@@ -37,7 +37,7 @@ const WORSE_PX: f64 = 0.5;
 const EXPLAINED: f64 = 0.6;
 /// Least turn that shows an axis, in radians.
 const LEAST_TURN: f64 = 0.05;
-/// Markers leave their plane if the noise falls to this part by it.
+/// Markers leave their plane, and boards bend, if the noise falls to this part by it.
 const RELIEF: f64 = 0.8;
 /// Moves of the camera looked for.
 const MOST_MOVES: usize = 8;
@@ -341,14 +341,14 @@ impl Estimate {
         }
     }
 
-    /// Lets learnt markers rise and tilt out of their plane if that explains much of the misfit: paper curls.
+    /// Lets learnt markers rise and tilt out of their plane, and a flat board bend, if that explains much of the misfit:
+    /// paper curls.
     fn find_relief(&mut self) {
-        if !matches!(self.rig.shape, Shape::Squares { .. }) {
-            return;
-        }
         let mut next = self.copy();
-        if let Shape::Squares { is_flat, .. } = &mut next.rig.shape {
-            *is_flat = false;
+        match (&mut next.rig.shape, &self.plane) {
+            (Shape::Squares { is_flat, .. }, _) => *is_flat = false,
+            (shape, Some(plane)) => *shape = Shape::Curled(Curled::new(&shape.points(), *plane)),
+            (_, None) => return,
         }
         let is_better = next.settle().is_ok()
             && next.used() >= self.used()

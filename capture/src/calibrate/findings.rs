@@ -167,8 +167,15 @@ fn left_out(result: &Calibration) -> Vec<String> {
     found
 }
 
-/// How far learnt markers rise out of the plane nearest to them, in parts of their side: lengths may have no unit.
+/// How far a board is bent, or learnt markers rise out of the plane nearest to them, in parts of their side: lengths may have no unit.
 fn relief(estimate: &Estimate) -> Option<String> {
+    if let Shape::Curled(curled) = &estimate.rig.shape {
+        let percent = 100.0 * curled.rise() / (2.0 * curled.reach);
+        return Some(format!(
+            "The board is bent, up to {percent:.1} % of its diagonal out of its plane, as paper that curls; taken into \
+             account, but better glued to something flat."
+        ));
+    }
     let (Shape::Squares { is_flat: false, side, .. }, Some(plane)) = (&estimate.rig.shape, &estimate.plane) else {
         return None;
     };

@@ -17,6 +17,7 @@
 
 mod bundle;
 mod clean;
+mod deviation;
 mod equations;
 mod error;
 mod estimate;
@@ -224,6 +225,12 @@ pub struct Turntable {
     /// Turn at each sighting in radians, unwrapped over several turns; 0 at the first used. `None` where it is
     /// not known.
     pub angles: Vec<Option<f64>>,
+    /// How far the direction of the axis in the target is off, in radians: the root of the mean squared angle, as far as
+    /// errors of corners are independent, and with what was assumed of the lens. `None` where the corners do not tell it.
+    pub axis_deviation: Option<f64>,
+    /// Standard deviation of the turn at each sighting in radians, against the mean turn of its segment (where a turn is
+    /// counted from is free), or from the motion where that tells it; `None` where the turn is not known.
+    pub angle_deviations: Vec<Option<f64>>,
     /// When the camera stood where.
     pub segments: Vec<Segment>,
     /// Mean speed in radians per second over each segment; `None` for stills or too few.

@@ -1,6 +1,7 @@
 //! What an estimate means: cameras in the world's axes, and those of pictures that it could not use.
 
 use super::clean::Cleaned;
+use super::deviation::{Deviations, deviations};
 use super::estimate::Estimate;
 use super::fill::Track;
 use super::findings::{findings, lens_report, notes};
@@ -19,7 +20,9 @@ pub(super) fn result(estimate: &Estimate, cleaned: &Cleaned, sightings: &[Sighti
         cleaned.indices.iter().enumerate().map(|(at, &index)| (index, rig.shape.point(at))).collect();
     let (motion, world_from_target) = match &rig.poses {
         Poses::Free(_) => (Motion::FreeHand, about_middle(&points)),
-        Poses::Turning(turning) => (Motion::Turntable(turntable(turning, pictures)), turning.world_from_target),
+        Poses::Turning(turning) => {
+            (Motion::Turntable(turntable(turning, pictures, deviations(estimate, turning))), turning.world_from_target)
+        }
     };
     let target_from_world = world_from_target.inverse();
     let frame = |(k, sighting): (usize, &Sighting)| {
@@ -100,7 +103,7 @@ fn reason(rig: &Rig, picture: &Picture, k: usize) -> String {
     }
 }
 
-fn turntable(turning: &Turning, pictures: &[Picture]) -> Turntable {
+fn turntable(turning: &Turning, pictures: &[Picture], deviations: Option<Deviations>) -> Turntable {
     let mut angles = vec![None; pictures.len()];
     let mut segments = Vec::new();
     let mut speeds = Vec::new();
@@ -128,6 +131,8 @@ fn turntable(turning: &Turning, pictures: &[Picture]) -> Turntable {
     Turntable {
         axis_point: target_from_world * Point3::origin(),
         axis_direction: target_from_world.rotation * Vector3::z(),
+        axis_deviation: deviations.as_ref().map(|d| d.axis),
+        angle_deviations: deviations.map_or_else(|| vec![None; angles.len()], |d| d.angles),
         angles,
         segments,
         speeds,
@@ -178,6 +183,7 @@ impl Calibration {
             self.frames[k].filled_deviation = Some(filled.deviation);
             if let Motion::Turntable(turntable) = &mut self.motion {
                 turntable.angles[k] = Some(filled.angle);
+                turntable.angle_deviations[k] = Some(filled.deviation);
             }
         }
     }

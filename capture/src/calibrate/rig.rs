@@ -2,7 +2,7 @@
 
 use super::projection::project;
 use crate::Intrinsics;
-use nalgebra::{Isometry3, Point2, Point3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Point2, Point3, UnitQuaternion, Vector2, Vector3};
 
 /// A corner in a picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -33,8 +33,23 @@ pub(super) struct Picture {
 pub(super) enum Shape {
     /// Held.
     Points(Vec<Point3<f64>>),
+    /// Held but for how they curl.
+    Curled(Curled),
     /// Squares, four points each; marker `fixed` stays where it is. While they are flat all lie in the plane z = 0.
     Squares { side: f64, places: Vec<Isometry3<f64>>, fixed: usize, is_flat: bool },
+}
+
+/// A printed board that is no longer flat.
+#[derive(Clone, Debug)]
+pub(super) struct Curled {
+    /// The points in the plane, about their middle.
+    flat: Vec<Vector2<f64>>,
+    /// Plane to target.
+    plane: Isometry3<f64>,
+    /// Of the height `½ xᵀ K x` above the plane: the matrix `K`, upper triangle, one over lengths.
+    pub(super) curvature: [f64; 3],
+    /// From the middle to the farthest point.
+    pub(super) reach: f64,
 }
 
 /// Where the camera was.
@@ -88,6 +103,7 @@ impl Shape {
     pub(super) fn point(&self, at: usize) -> Point3<f64> {
         match self {
             Self::Points(points) => points[at],
+            Self::Curled(curled) => curled.point(at),
             Self::Squares { side, places, .. } => square_corner(&places[at / 4], *side, at % 4),
         }
     }
@@ -95,8 +111,41 @@ impl Shape {
     pub(super) fn points(&self) -> Vec<Point3<f64>> {
         match self {
             Self::Points(points) => points.clone(),
+            Self::Curled(curled) => (0..curled.flat.len()).map(|at| curled.point(at)).collect(),
             Self::Squares { places, .. } => (0..4 * places.len()).map(|at| self.point(at)).collect(),
         }
+    }
+}
+
+impl Curled {
+    /// Without curl yet.
+    pub(super) fn new(points: &[Point3<f64>], plane: Isometry3<f64>) -> Self {
+        let flat: Vec<Vector2<f64>> = points.iter().map(|p| plane.inverse_transform_point(p).coords.xy()).collect();
+        let reach = flat.iter().map(Vector2::norm).fold(0.0, f64::max);
+        Self { flat, plane, curvature: [0.0; 3], reach }
+    }
+
+    /// Paper keeps its lengths: to the third order the arc `(sin κu, 1 − cos κu) / κ` where `K = κ n nᵀ`, `u = n · x`.
+    fn point(&self, at: usize) -> Point3<f64> {
+        let x = self.flat[at];
+        let [xx, xy, yy] = self.curvature;
+        let slope = Vector2::new(xx * x.x + xy * x.y, xy * x.x + yy * x.y);
+        let along = x - slope * (slope.dot(&x) / 6.0);
+        let height = 0.5 * slope.dot(&x) * (1.0 - slope.norm_squared() / 12.0);
+        self.plane * Point3::new(along.x, along.y, height)
+    }
+
+    /// How a point moves with each curvature, in the first order.
+    pub(super) fn by_curvature(&self, at: usize) -> [Vector3<f64>; 3] {
+        let x = self.flat[at];
+        let up = self.plane.rotation * Vector3::z();
+        [0.5 * x.x * x.x, x.x * x.y, 0.5 * x.y * x.y].map(|height| up * height)
+    }
+
+    /// The largest height above the plane.
+    pub(super) fn rise(&self) -> f64 {
+        let height = |at| self.plane.inverse_transform_point(&self.point(at)).z.abs();
+        (0..self.flat.len()).map(height).fold(0.0, f64::max)
     }
 }
 
@@ -122,7 +171,7 @@ impl Rig {
     }
 
     /// From where the rig puts each corner to where it is seen, in pixels; `None` where it puts it out of sight.
-    pub(super) fn residuals(&self, picture: usize, corners: &[Corner]) -> Vec<Option<nalgebra::Vector2<f64>>> {
+    pub(super) fn residuals(&self, picture: usize, corners: &[Corner]) -> Vec<Option<Vector2<f64>>> {
         let pose = self.pose(picture);
         let residual = |c: &Corner| Some(c.pixel - project(&self.lens, &(pose * self.shape.point(c.point)).coords)?);
         corners.iter().map(residual).collect()

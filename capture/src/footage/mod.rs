@@ -5,10 +5,13 @@
 
 mod stills;
 
-use crate::{CaptureError, Image};
+use crate::{CaptureError, Image, pixels};
 use std::path::{Path, PathBuf};
 
 pub use stills::read_upright;
+
+/// Focal lengths noted that differ by less, in parts of them, are one.
+const SAME_FOCAL: f64 = 0.01;
 
 /// Films and folders of photographs of one object.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -101,6 +104,16 @@ impl Footage {
             Take::Film(_) => Vec::new(),
         };
         self.takes.iter().enumerate().flat_map(of_take).collect()
+    }
+
+    /// The focal length in pixels, for pictures of this size, that the camera noted in the photographs (EXIF), to a tenth or
+    /// so. `None` of films, where none has a note, and where they disagree by a hundredth: the zoom was touched.
+    pub fn noted_focal_px(&self, size: [usize; 2]) -> Option<f64> {
+        let sources = self.photographs();
+        let files = sources.iter().filter_map(|source| source.file.as_deref());
+        let noted: Vec<f64> = files.filter_map(|file| pixels::noted_focal_px(file, size)).collect();
+        let first = *noted.first()?;
+        noted.iter().all(|focal| (focal / first - 1.0).abs() < SAME_FOCAL).then_some(first)
     }
 
     /// Whether there is a film in it.

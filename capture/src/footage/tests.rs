@@ -90,3 +90,25 @@ fn a_photograph_is_turned_as_the_camera_was_held() {
     assert_eq!((upright.width(), upright.height()), (16, 32));
     assert!(upright.at(13, 2)[0] < 40 && upright.at(2, 2)[0] > 160);
 }
+
+#[test]
+fn the_focal_length_is_what_the_photographs_agree_on() {
+    let folder = folder_of(&[("1.jpg", [40, 30]), ("2.jpg", [40, 30]), ("3.jpg", [40, 30])]);
+    let image = ::image::RgbImage::from_pixel(40, 30, ::image::Rgb([90; 3]));
+    let note = |name: &str, length: u16| {
+        let path = folder.path().join(name);
+        image.save(&path).unwrap();
+        let notes = crate::exif::tests::notes(&[(0xa405, length)], &[]);
+        let size = (8 + notes.len() as u16).to_be_bytes();
+        let mut bytes = std::fs::read(&path).unwrap();
+        // After the two bytes that begin a JPEG.
+        bytes.splice(2..2, [&[0xff, 0xe1][..], &size, b"Exif\0\0", &notes].concat());
+        std::fs::write(&path, bytes).unwrap();
+    };
+    let told = || Footage::open(&[folder.path().to_owned()]).unwrap().noted_focal_px([40, 30]);
+    image.save(folder.path().join("3.jpg")).unwrap();
+    ["1.jpg", "2.jpg"].iter().for_each(|name| note(name, 28));
+    assert!((told().unwrap() - 28.0 / 43.267 * 50.0).abs() < 1e-6, "{:?}", told());
+    note("2.jpg", 35);
+    assert_eq!(told(), None);
+}

@@ -3,6 +3,7 @@
 //! OpenCV puts pixel *centres* at whole numbers and keeps colours as blue, green, red; both are converted here
 //! and nowhere else.
 
+mod blur;
 mod detect;
 mod observe;
 mod orientation;

@@ -1,6 +1,6 @@
 //! Looks through footage once: how sharp every frame is, how far it moved, and where it shows the board.
 
-use super::{BoardView, Pattern, detect_pattern, recognise_pattern};
+use super::{BoardView, Pattern, blur, detect_pattern, recognise_pattern};
 use crate::footage::{Footage, FootageFrame, FrameSource};
 use crate::{CaptureError, Image, choose};
 use rayon::prelude::*;
@@ -14,6 +14,9 @@ pub struct Observed {
     pub sharpness: f64,
     /// Mean difference from the frame before, in levels of a small picture of both; 0 for the first of a take.
     pub motion: f64,
+    /// Standard deviation, in pixels, of the blur at the edges of the board: the root mean square over its two sides, in
+    /// linear light, without that of the pixels themselves. `None` where too little of the board is seen.
+    pub blur_px: Option<f64>,
     /// What is seen of the board.
     pub view: BoardView,
 }
@@ -116,8 +119,9 @@ fn read_batch(
 
 fn look(frame: &FootageFrame, pattern: Option<&Pattern>) -> Result<(Observed, Image<u8>), CaptureError> {
     let view = pattern.map(|pattern| detect_pattern(&frame.image, pattern)).transpose()?.unwrap_or_default();
+    let blur_px = pattern.and_then(|pattern| blur::blur_px(&frame.image, pattern, &view));
     let sharpness = choose::sharpness(&frame.image);
-    Ok((Observed { source: frame.source.clone(), sharpness, motion: 0.0, view }, small(&frame.image)))
+    Ok((Observed { source: frame.source.clone(), sharpness, motion: 0.0, blur_px, view }, small(&frame.image)))
 }
 
 /// The green channel at every so many pixels: enough to see that something moved.

@@ -28,7 +28,7 @@ pub(super) fn find_cameras(
     if sightings.len() < 2 {
         return Err(too_few(footage, &described(&pattern, is_measured), &sightings, &seen));
     }
-    let lens = lens(options, &pattern, seen.size, stages)?;
+    let lens = lens(footage, options, &pattern, seen.size, stages)?;
     let calibrate_options = CalibrateOptions {
         lens,
         motion: options.motion,
@@ -137,14 +137,15 @@ fn too_few(footage: &Footage, board: &str, sightings: &[Sighting], seen: &Observ
     ))
 }
 
-/// What is known of the lens: from calibration shots, if there are any.
+/// What is known of the lens: from calibration shots, if there are any, or from what the camera noted.
 fn lens(
+    footage: &Footage,
     options: &FootageOptions,
     pattern: &Pattern,
     size: [usize; 2],
     stages: &mut Stages<'_>,
 ) -> Result<LensKnowledge, Error> {
-    let Some(shots) = &options.calibration else { return Ok(LensKnowledge::Unknown) };
+    let Some(shots) = &options.calibration else { return Ok(noted_lens(footage, size, stages)) };
     let found = stages.run("recognise calibration board", |_| recognise_in_footage(shots))?;
     let pattern = match found {
         Some(found) => sized(found, options.length.unwrap_or(1.0)),
@@ -170,6 +171,13 @@ fn lens(
         stages.observer().noted(&format!("the calibration shots are used as far as they go: {fault}"));
     }
     Ok(LensKnowledge::Known(calibration.intrinsics))
+}
+
+/// What the photographs' own notes say.
+fn noted_lens(footage: &Footage, size: [usize; 2], stages: &Stages<'_>) -> LensKnowledge {
+    let Some(focal) = footage.noted_focal_px(size) else { return LensKnowledge::Unknown };
+    stages.observer().noted(&format!("the camera noted a focal length of about {focal:.0} px"));
+    LensKnowledge::Guess(focal)
 }
 
 fn lens_note(lens: &Intrinsics, rms_px: f64) -> String {
@@ -229,10 +237,12 @@ fn bare(frame: &Observed) -> Shot {
     Shot {
         source: frame.source.clone(),
         sharpness: frame.sharpness,
+        blur_px: frame.blur_px,
         motion: frame.motion,
         camera: None,
         pose: PoseSource::Missing,
         angle: None,
+        angle_deviation: None,
         standpoint: None,
         corners: 0,
         rms_px: 0.0,
@@ -256,6 +266,7 @@ fn sighted(frame: &Observed, sighting: usize, pose: &FramePose, turntable: Optio
         camera: pose.camera,
         pose: source,
         angle: turntable.and_then(|t| t.angles.get(sighting).copied().flatten()),
+        angle_deviation: turntable.and_then(|t| t.angle_deviations.get(sighting).copied().flatten()),
         standpoint: segments.iter().position(|s| (s.first..=s.last).contains(&sighting)),
         corners: pose.used.len(),
         rms_px: pose.rms_px,
@@ -272,6 +283,7 @@ fn unsighted(frame: &Observed, calibration: &Calibration) -> Shot {
         camera: Some(filled.camera),
         pose: PoseSource::Filled,
         angle: Some(filled.angle),
+        angle_deviation: Some(filled.deviation),
         standpoint: Some(filled.segment),
         ..bare(frame)
     }

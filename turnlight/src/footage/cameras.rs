@@ -76,8 +76,8 @@ fn by_colmap(
     }
     let photograph = |source: &FrameSource| {
         let takes = footage.takes.len();
-        let matte = options.masks.as_ref().map(|folder| silhouettes::given(folder, source, takes, None)).transpose()?;
-        Ok(Photograph { image: source.file.clone().unwrap_or_default(), matte })
+        let mask = options.masks.as_ref().map(|folder| silhouettes::mask_of(folder, source, takes)).transpose()?;
+        Ok(Photograph { image: source.file.clone().unwrap_or_default(), mask })
     };
     let pictures = sources.iter().map(photograph).collect::<Result<Vec<_>, Error>>()?;
     let colmap = ColmapOptions { program: program.to_owned(), ..ColmapOptions::default() };
@@ -109,10 +109,12 @@ fn photographed(
         shots.push(Shot {
             source,
             sharpness: sharpness?,
+            blur_px: None,
             motion: 0.0,
             camera,
             pose: if camera.is_some() { PoseSource::Measured } else { PoseSource::Missing },
             angle: None,
+            angle_deviation: None,
             standpoint: None,
             corners: 0,
             rms_px: 0.0,

@@ -4,9 +4,9 @@ use super::pictures::Pictures;
 use super::{FootageOptions, Shots};
 use crate::Error;
 use crate::shading::shading_samples;
-use capture::light::{LightCheck, LightKind, ShadedSurface, ball_from_outline, ball_light, judge_light};
+use capture::light::{LightCheck, LightKind, ball_from_outline, ball_light, judge_light, outline_near};
 use capture::silhouette::Silhouettes;
-use capture::{Camera, View};
+use capture::{Camera, Image, View};
 use geometry::hull::{HullOptions, visual_hull};
 use nalgebra::{Point2, Vector3};
 use rayon::prelude::*;
@@ -25,7 +25,9 @@ pub struct FootageLight {
 const SIDE: usize = 320;
 /// Cells along the object's longest side.
 const CELLS: usize = 48;
-/// Points of the outline of a ball.
+/// Frames in which the ball's outline is looked for together.
+const MEAN_OF: usize = 8;
+/// Points of the outline of a ball that does not stand out.
 const OUTLINE: usize = 32;
 
 /// Follows the shading of places on a coarse hull over the frames, and looks at the ball, if there is one.
@@ -77,7 +79,7 @@ fn shading(views: &[View], shots: &Shots, kept: &[usize], silhouettes: &Silhouet
     let mesh = visual_hull(views, &hull_options).ok()?.mesh;
     let turn = |view: &View| shots.shots[kept[view.index]].angle.unwrap_or_else(|| -azimuth(&view.camera));
     let angles: Vec<f64> = views.iter().map(turn).collect();
-    let check = judge_light(&shading_samples(&mesh, views, &angles, &Vector3::z()), ShadedSurface::AllAround);
+    let check = judge_light(&shading_samples(&mesh, views, &angles, &Vector3::z()));
     // A camera that is carried around leaves object and light alone.
     let is_carried = shots.calibration.is_some() && shots.turntable().is_none();
     Some(if is_carried { LightCheck { kind: LightKind::Object, ..check } } else { check })
@@ -97,6 +99,25 @@ pub(super) fn check_ball(shots: &Shots, options: &FootageOptions) -> Result<(), 
     Err(Error::Arguments(format!("{fault}; leave it away, or give the films one by one")))
 }
 
+fn on_circle([x, y]: [f64; 2], radius: f64) -> impl Fn(f64) -> Point2<f64> {
+    move |angle| Point2::new(x + radius * angle.cos(), y + radius * angle.sin())
+}
+
+/// What stands still, sharp, and what turns, smeared: the mean of a few frames.
+fn mean_picture(pictures: &Pictures, count: usize) -> Result<Image<[u8; 3]>, Error> {
+    let chosen: Vec<usize> = (0..count).step_by(count.div_ceil(MEAN_OF).max(1)).collect();
+    let mut sums: Vec<[u32; 3]> = Vec::new();
+    let mut size = [0, 0];
+    for &at in &chosen {
+        let image = pictures.read(at)?;
+        size = [image.width(), image.height()];
+        sums.resize(image.pixels().len(), [0; 3]);
+        sums.iter_mut().zip(image.pixels()).for_each(|(sum, p)| (0..3).for_each(|c| sum[c] += u32::from(p[c])));
+    }
+    let mean = |sum: [u32; 3]| sum.map(|v| (v / chosen.len() as u32) as u8);
+    Ok(Image::from_pixels(size[0], size[1], sums.into_iter().map(mean).collect()).unwrap_or_default())
+}
+
 /// Where the highlight of the ball says the light is. The ball stands in the room: its outline is the same in all frames
 /// of a camera that stands still.
 fn directions(
@@ -106,11 +127,10 @@ fn directions(
     options: &FootageOptions,
 ) -> Result<Vec<Option<Vector3<f64>>>, Error> {
     let Some([x, y, radius]) = options.light_ball else { return Ok(vec![None; kept.len()]) };
-    let on_outline = |k: usize| {
-        let angle = TAU * k as f64 / OUTLINE as f64;
-        Point2::new(x + radius * angle.cos(), y + radius * angle.sin())
+    let outline = match outline_near(&mean_picture(pictures, kept.len())?, [x, y, radius]) {
+        Some(outline) => outline,
+        None => (0..OUTLINE).map(|k| TAU * k as f64 / OUTLINE as f64).map(on_circle([x, y], radius)).collect(),
     };
-    let outline: Vec<Point2<f64>> = (0..OUTLINE).map(on_outline).collect();
     let direction = |at: usize| {
         let Some(camera) = shots.shots[kept[at]].camera else { return Ok(None) };
         let ball = ball_from_outline(&camera, &outline);

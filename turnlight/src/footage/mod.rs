@@ -50,8 +50,8 @@ pub struct FootageOptions {
     pub masks: Option<PathBuf>,
     /// Pictures of the set without the object, one per camera position.
     pub clean_plates: Vec<PathBuf>,
-    /// Column, row and radius in pixels of the outline of a shiny ball that stands in the room: its highlight shows
-    /// where the light is.
+    /// Column, row and radius in pixels, to a tenth of the radius, of the outline of a shiny ball that stands in the room:
+    /// its highlight shows where the light is.
     pub light_ball: Option<[f64; 3]>,
     /// Frames to keep at most; `None` for as many as [`capture::choose::ChooseOptions`] says.
     pub most: Option<usize>,

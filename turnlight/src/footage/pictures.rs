@@ -3,7 +3,7 @@
 use crate::Error;
 use crate::stages::Observer;
 use capture::footage::{Footage, FootageFrame, FrameSource};
-use capture::{CaptureError, Image, read_rgb, write_rgb};
+use capture::{CaptureError, Image, read_rgb, srgb, write_rgb};
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
@@ -88,19 +88,10 @@ const LEAST_GAIN: f64 = 0.004;
 pub(super) fn evened(image: &Image<[u8; 3]>, gains: &[f64; 3]) -> Image<[u8; 3]> {
     let table = gains.map(|gain| {
         let level = |encoded: usize| {
-            let linear = gain * linear_light(encoded as f64 / 255.0);
-            (255.0 * encoded_light(linear.clamp(0.0, 1.0))).round() as u8
+            let linear = gain * srgb::linear(encoded as f64 / 255.0);
+            (255.0 * srgb::encoded(linear.clamp(0.0, 1.0))).round() as u8
         };
         std::array::from_fn::<u8, 256, _>(level)
     });
     image.map(|p| [0, 1, 2].map(|c| table[c][usize::from(p[c])]))
-}
-
-/// IEC 61966-2-1 (sRGB).
-fn linear_light(encoded: f64) -> f64 {
-    if encoded <= 0.04045 { encoded / 12.92 } else { ((encoded + 0.055) / 1.055).powf(2.4) }
-}
-
-fn encoded_light(linear: f64) -> f64 {
-    if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 }
 }

@@ -7,7 +7,7 @@ use crate::footage_report::{
     Measured, Overlay, Severity, Thumbnail,
 };
 use capture::calibrate::{Calibration, LensParameter, LensTerm, Source};
-use capture::choose::DropReason;
+use capture::choose::{DropReason, PoseSource};
 use capture::footage::Footage;
 use capture::silhouette::Evidence;
 use nalgebra::Point3;
@@ -95,11 +95,12 @@ impl CapturedFootage {
                 dropped,
                 pose: shot.pose,
                 angle_deg: shot.angle.map(f64::to_degrees),
+                angle_deviation_deg: shot.angle_deviation.map(f64::to_degrees),
                 direction: towards.and_then(|d| d.try_normalize(0.0)).map(Into::into),
                 rms_px: is_told.then_some(shot.rms_px),
                 corners: is_told.then_some(shot.corners),
                 sharpness: (sharp > 0.0).then(|| shot.sharpness / sharp),
-                blur_px: None,
+                blur_px: shot.blur_px,
                 agreement: chosen.map(|at| self.silhouettes.agreement[at]),
                 exposure_gain: chosen.map(|at| self.silhouettes.gains[at].iter().sum::<f64>() / 3.0),
             }
@@ -163,10 +164,17 @@ impl CapturedFootage {
     }
 
     fn axis(&self) -> Option<AxisReport> {
-        self.shots.turntable()?;
-        // The world is laid along it.
-        let (point, direction) = ([0.0; 3], [0.0, 0.0, 1.0]);
-        Some(AxisReport { point, direction, deviation_deg: None, angle_deviation_deg: None })
+        let turntable = self.shots.turntable()?;
+        let measured = self.shots.shots.iter().filter(|shot| shot.pose == PoseSource::Measured);
+        let squares: Vec<f64> = measured.filter_map(|shot| shot.angle_deviation).map(|d| d * d).collect();
+        let mean = squares.iter().sum::<f64>() / squares.len().max(1) as f64;
+        Some(AxisReport {
+            // The world is laid along it.
+            point: [0.0; 3],
+            direction: [0.0, 0.0, 1.0],
+            deviation_deg: turntable.axis_deviation.map(f64::to_degrees),
+            angle_deviation_deg: (!squares.is_empty()).then(|| mean.sqrt().to_degrees()),
+        })
     }
 
     fn findings(&self) -> Vec<Finding> {

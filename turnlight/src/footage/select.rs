@@ -64,7 +64,7 @@ fn film_frame(shots: &Shots, at: usize) -> FilmFrame {
     FilmFrame {
         time_s: shot.source.time_s,
         sharpness: shot.sharpness,
-        blur_px: None,
+        blur_px: shot.blur_px,
         viewpoint: viewpoint(shots, at),
         pose: shot.pose,
         motion: shot.motion,

@@ -13,6 +13,8 @@ pub struct Shot {
     pub source: FrameSource,
     /// As [`capture::choose::sharpness`] says; 0 where it was not looked at.
     pub sharpness: f64,
+    /// Standard deviation of the blur at the edges of the board, in pixels, where enough of it is seen.
+    pub blur_px: Option<f64>,
     /// How far the picture moved since the frame before.
     pub motion: f64,
     /// World to pixels, where known.
@@ -21,6 +23,8 @@ pub struct Shot {
     pub pose: PoseSource,
     /// Turn of the table in radians, unwrapped.
     pub angle: Option<f64>,
+    /// Standard deviation of that turn in radians, where it was estimated.
+    pub angle_deviation: Option<f64>,
     /// For how long the camera stood where it did in this frame: position among the standpoints; `None` in hand.
     pub standpoint: Option<usize>,
     /// Corners of the board that were used.

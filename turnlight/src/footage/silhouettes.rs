@@ -6,7 +6,7 @@ use crate::Error;
 use capture::footage::{FrameSource, read_upright};
 use capture::silhouette::{SilhouetteOptions, Silhouettes, StageSetup, check_silhouettes, find_silhouettes};
 use capture::{Image, read_matte};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Finds the silhouettes, or reads and judges those given.
 pub(super) fn find(
@@ -19,7 +19,7 @@ pub(super) fn find(
     match &options.masks {
         Some(folder) => {
             let takes = shots.takes();
-            let mask = |&at: &usize| given(folder, &shots.shots[at].source, takes, Some(shots.size));
+            let mask = |&at: &usize| given(folder, &shots.shots[at].source, takes, shots.size);
             let mattes = kept.iter().map(mask).collect::<Result<Vec<_>, _>>()?;
             Ok(check_silhouettes(&mattes, &setup)?)
         }
@@ -71,14 +71,16 @@ fn clean_plate(path: &Path, size: [usize; 2]) -> Result<Image<[u8; 3]>, Error> {
     check_size(path, [plate.width(), plate.height()], size).map(|()| plate)
 }
 
-/// The mask of a frame: `NAME.png`, `NAME.EXT.png` or `NAME.mask.png` of a photograph, the number of the frame counted
+/// The mask of a frame, of the frame's size.
+fn given(folder: &Path, source: &FrameSource, takes: usize, size: [usize; 2]) -> Result<Image<u8>, Error> {
+    let path = mask_of(folder, source, takes)?;
+    let mask = read_matte(&path)?;
+    check_size(&path, [mask.width(), mask.height()], size).map(|()| mask)
+}
+
+/// The file of a frame's mask: `NAME.png`, `NAME.EXT.png` or `NAME.mask.png` of a photograph, the number of the frame counted
 /// from 0 (any number of leading zeros) of a film. Of several takes each has a folder of its name.
-pub(super) fn given(
-    folder: &Path,
-    source: &FrameSource,
-    takes: usize,
-    size: Option<[usize; 2]>,
-) -> Result<Image<u8>, Error> {
+pub(super) fn mask_of(folder: &Path, source: &FrameSource, takes: usize) -> Result<PathBuf, Error> {
     let folder = if takes > 1 { folder.join(&source.take_name) } else { folder.to_owned() };
     let names = match &source.file {
         Some(file) => {
@@ -93,12 +95,7 @@ pub(super) fn given(
         let fault = format!("{}: has no mask for {} (looked for {})", folder.display(), source.name, names.join(", "));
         Error::Failed(format!("{fault}; add it, or leave the frame out of the footage"))
     };
-    let path = path.ok_or_else(missing)?;
-    let mask = read_matte(&path)?;
-    if let Some(size) = size {
-        check_size(&path, [mask.width(), mask.height()], size)?;
-    }
-    Ok(mask)
+    path.ok_or_else(missing)
 }
 
 /// Refuses a picture of another size than the frames.

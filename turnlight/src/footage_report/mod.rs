@@ -84,6 +84,8 @@ pub struct FrameReport {
     pub pose: PoseSource,
     /// Turn of the platter since the first frame.
     pub angle_deg: Option<f64>,
+    /// Standard deviation of that turn, where it was estimated.
+    pub angle_deviation_deg: Option<f64>,
     /// Unit direction from the object towards the camera, in the world.
     pub direction: Option<[f64; 3]>,
     /// Reprojection error of the board, RMS.
@@ -92,7 +94,7 @@ pub struct FrameReport {
     pub corners: Option<usize>,
     /// Sharpness relative to the sharp frames of the footage.
     pub sharpness: Option<f64>,
-    /// Blur at the corners of the board.
+    /// Standard deviation of the blur at the edges of the board.
     pub blur_px: Option<f64>,
     /// IoU of its silhouette with what those of the other frames leave of the object.
     pub agreement: Option<f64>,
@@ -169,9 +171,9 @@ pub struct AxisReport {
     pub point: [f64; 3],
     /// Its unit direction; the object turns right-handed about it.
     pub direction: [f64; 3],
-    /// Standard deviation of the direction, degrees.
+    /// Root of the mean squared angle between the direction told and the true one in the board, degrees.
     pub deviation_deg: Option<f64>,
-    /// Standard deviation of an angle, degrees.
+    /// Standard deviation of the turn of a frame that shows the board, root of their mean square, degrees.
     pub angle_deviation_deg: Option<f64>,
 }
 

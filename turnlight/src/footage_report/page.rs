@@ -12,9 +12,10 @@ const SUSPECT_AGREEMENT: f64 = 0.95;
 /// Reprojection errors above this multiple of the middle one are shown in red.
 const SUSPECT_RMS: f64 = 3.0;
 
-const FIGURES: [Figure; 5] = [
+const FIGURES: [Figure; 6] = [
     Figure { title: "Reprojection error of the board, px RMS", read: |f| f.rms_px, from_zero: true },
     Figure { title: "Sharpness, relative to the sharp frames", read: |f| f.sharpness, from_zero: true },
+    Figure { title: "Blur at the edges of the board, px", read: |f| f.blur_px, from_zero: true },
     Figure { title: "Agreement of the silhouette with the others, IoU", read: |f| f.agreement, from_zero: false },
     Figure { title: "Turn of the platter, °", read: |f| f.angle_deg, from_zero: true },
     Figure { title: "Exposure gain", read: |f| f.exposure_gain, from_zero: false },
@@ -23,9 +24,10 @@ const FIGURES: [Figure; 5] = [
 /// A column of the table: its head, and what a frame has there.
 type Column = (&'static str, fn(&FrameReport) -> Option<String>);
 
-const COLUMNS: [Column; 8] = [
+const COLUMNS: [Column; 9] = [
     ("time, s", |f| f.time_s.map(|v| format!("{v:.2}"))),
     ("angle, °", |f| f.angle_deg.map(|v| format!("{v:.2}"))),
+    ("± °", |f| f.angle_deviation_deg.map(|v| format!("{v:.3}"))),
     ("RMS, px", |f| f.rms_px.map(|v| format!("{v:.3}"))),
     ("corners", |f| f.corners.map(|v| v.to_string())),
     ("blur, px", |f| f.blur_px.map(|v| format!("{v:.2}"))),

@@ -12,6 +12,7 @@ fn frame(position: usize) -> FrameReport {
         dropped: None,
         pose: PoseSource::Measured,
         angle_deg: Some(angle),
+        angle_deviation_deg: Some(0.004),
         direction: Some([angle.to_radians().cos(), -angle.to_radians().sin(), 0.5]),
         rms_px: Some(0.1),
         corners: Some(30),
@@ -50,7 +51,7 @@ fn report() -> FootageReport {
             point: [0.0; 3],
             direction: [0.0, 0.0, 1.0],
             deviation_deg: Some(0.02),
-            angle_deviation_deg: None,
+            angle_deviation_deg: Some(0.004),
         }),
         silhouettes: "masks given".to_owned(),
         light: None,
@@ -85,7 +86,7 @@ fn the_verdict_is_three_sentences_with_the_figures() {
     assert_eq!(first, "12 of 12 frames make the capture, all around in steps of 30.0°.");
     assert_eq!(
         second,
-        "The board reprojects to 0.12 px RMS, the focal length is 588.8 ± 0.4 px, the axis is known to 0.02° and \
+        "The board reprojects to 0.12 px RMS, the focal length is 588.8 ± 0.4 px, the axis is known to 0.020° and \
          silhouettes agree to 0.986 in the middle and 0.980 at worst (frame 0)."
     );
     assert_eq!(third, "Nothing needs filming again.");
@@ -115,6 +116,7 @@ fn the_page_needs_no_other_file_and_escapes_names() {
     }
     assert!(!page.contains("NaN") && !page.contains("inf "));
     assert!(page.contains("100.0 × 200.0 × 300.0 mm") && page.contains("588.81 ± 0.42"));
+    assert!(page.contains("± 0.020°") && page.contains("± 0.004°"));
 }
 
 #[test]
@@ -191,5 +193,6 @@ fn the_json_has_the_verdict_and_units_in_its_names() {
     assert_eq!(json["grade"], "good");
     assert_eq!(json["verdict"].as_array().map(Vec::len), Some(3));
     assert_eq!(json["frames"][2]["angle_deg"], 60.0);
+    assert_eq!(json["frames"][2]["angle_deviation_deg"], 0.004);
     assert_eq!(json["lens"]["focal_px"][0]["deviation"], 0.42);
 }

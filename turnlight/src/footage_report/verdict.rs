@@ -106,7 +106,7 @@ fn precision(report: &FootageReport) -> String {
         parts.push(format!("the focal length is {} px", measured(&lens.focal_px[0], 1)));
     }
     if let Some(deviation) = report.axis.as_ref().and_then(|axis| axis.deviation_deg) {
-        parts.push(format!("the axis is known to {deviation:.2}°"));
+        parts.push(format!("the axis is known to {deviation:.3}°"));
     }
     if let Some((middle, worst)) = agreement(report) {
         let at = worst.position;

@@ -44,6 +44,23 @@ fn a_board_waved_by_hand_tells_the_lens() {
 }
 
 #[test]
+fn a_focal_length_noted_by_the_camera_narrows_what_few_pictures_leave_open() {
+    // Three pictures from afar: hardly any perspective.
+    let pinhole = Intrinsics { distortion: Distortion::default(), ..lens() };
+    let film = Film { lens: pinhole, noise: 0.3, ..Film::flat(30.0, 3) };
+    let film = Film { camera: look(30.0, 2.5, film.axis.0, 0.02), ..film };
+    let sightings = film.sightings(8);
+    let focal = |lens: LensKnowledge| {
+        term(&of_board(&sightings, &CalibrateOptions { lens, ..options() }), LensParameter::Focal)
+    };
+    // Noted 4 % too long.
+    let (unknown, noted) = (focal(LensKnowledge::Unknown), focal(LensKnowledge::Guess(1.04 * 1180.0)));
+    assert!(noted.deviation < 0.1 * noted.value && noted.deviation < 0.8 * unknown.deviation, "{unknown:?} {noted:?}");
+    assert!((noted.value - 1180.0).abs() < 2.0 * noted.deviation, "{noted:?}");
+    assert_eq!(noted.source, Source::Assumption);
+}
+
+#[test]
 fn without_distortion_one_tilt_tells_no_lens_at_all() {
     let pinhole = Intrinsics { distortion: Distortion::default(), ..lens() };
     let film = Film { lens: pinhole, ..Film::flat(35.0, 24) };

@@ -1,6 +1,7 @@
 //! Cameras told from corners whose truth is known.
 
 mod chance;
+mod deviation;
 mod faults;
 mod lens;
 mod platter;

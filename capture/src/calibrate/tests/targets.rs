@@ -181,3 +181,30 @@ fn markers_on_paper_that_curls_leave_its_plane() {
     let result = calibrate(&Target::Markers { side: 0.025 }, &flat, &known()).unwrap();
     assert!(result.points.iter().all(|(_, p)| p.z == 0.0));
 }
+
+#[test]
+fn a_board_that_curls_is_unrolled_and_a_flat_one_is_left_alone() {
+    // Rolled about a slanted line through its middle, by a radius of 0.7 m.
+    let across = Vector3::new(0.8, 0.6, 0.0);
+    let middle = Point3::new(0.105, 0.105, 0.0);
+    let rolled = |p: &Point3<f64>| {
+        let u = across.dot(&(p - middle));
+        let turn = u / 0.7;
+        p + across * (0.7 * turn.sin() - u) + Vector3::z() * (0.7 * (1.0 - turn.cos()))
+    };
+    let flat = Film::flat(35.0, 24);
+    let film = Film { points: board().iter().map(rolled).collect(), ..flat.clone() };
+    for options in [known(), options()] {
+        let result = of_board(&film.sightings(78), &options);
+        assert!(result.rms_px < 0.16, "{}", result.rms_px);
+        assert!(result.notes.iter().any(|n| n.contains("board is bent")), "{:?}", result.notes);
+        let truth: Vec<(usize, Point3<f64>)> = film.points.iter().copied().enumerate().collect();
+        let heights: Vec<f64> = truth.iter().map(|(k, p)| result.points[*k].1.z - p.z).collect();
+        let mean = heights.iter().sum::<f64>() / heights.len() as f64;
+        assert!(heights.iter().all(|h| (h - mean).abs() < 2e-4), "{heights:?}");
+        assert!(axis_error_deg(&result, &film) < 0.1, "{}", axis_error_deg(&result, &film));
+        assert!(angle_error_deg(&result, &film.angles) < 0.02);
+    }
+    let result = of_board(&flat.sightings(79), &known());
+    assert!(result.points.iter().all(|(k, p)| *p == board()[*k]), "{:?}", result.notes);
+}
