@@ -24,6 +24,7 @@ pub mod filter;
 pub mod path;
 pub mod reference;
 mod resolve;
+pub mod web;
 
 pub use error::RenderError;
 

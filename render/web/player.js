@@ -27,7 +27,7 @@ import { GLTFLoader } from 'three/addons/loaders/GLTFLoader.js';
 import { EXTENSION, ModelError, TurnlightPlugin, checkContainer } from './turnlight-loader.js';
 
 const MODEL = 'model.glb';
-const NAMES = { static: 'Static texture', vdtm: 'View-dependent texture mapping', lumigraph: 'Unstructured lumigraph', dyntex: 'Dynamic texture' };
+const NAMES = { static: 'Static texture', vdtm: 'View-dependent texture mapping (VDTM)', lumigraph: 'Unstructured lumigraph', dyntex: 'Dynamic texture (DynTex)' };
 const BACKGROUND = [27, 29, 33];
 const FIELD_OF_VIEW_DEG = 30;
 const TURN_SECONDS = 12;

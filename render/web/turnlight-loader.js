@@ -34,6 +34,7 @@ import {
   NoColorSpace,
   OrthographicCamera,
   RGBAFormat,
+  RGFormat,
   RawShaderMaterial,
   RedFormat,
   Scene,
@@ -565,26 +566,27 @@ precision highp sampler2D;
 precision highp sampler2DArray;
 layout(location = 0) out vec4 result;`;
 
-/** Layers: numbers of a facet are bias, count of layers, then one gain per layer. */
+/** Layers: a facet has pairs of numbers: bias and how many layers it shows, then gain and layer of each. */
 const BLEND_LAYERS = /* glsl */ `${HEAD}
 uniform sampler2DArray layers;
 uniform sampler2D facets;
 uniform sampler2D weights;
 uniform ivec2 last;
 uniform int row;
-float number(int i) {
+vec2 pair(int i) {
   int width = textureSize(weights, 0).x;
-  return texelFetch(weights, ivec2(i % width, i / width), 0).r;
+  return texelFetch(weights, ivec2(i % width, i / width), 0).rg;
 }
 void main() {
   ivec2 at = min(ivec2(gl_FragCoord.xy), last);
   vec2 code = texelFetch(facets, at, 0).rg * 255.0;
   int start = int(code.r + 256.0 * code.g + 0.5) * row;
-  vec3 sum = vec3(number(start));
-  int count = int(number(start + 1));
-  for (int k = 0; k < count; k++) {
-    float gain = number(start + 2 + k);
-    if (gain != 0.0) sum += gain * texelFetch(layers, ivec3(at, k), 0).rgb;
+  vec2 head = pair(start);
+  vec3 sum = vec3(head.x);
+  int end = start + int(head.y);
+  for (int i = start + 1; i <= end; i++) {
+    vec2 term = pair(i);
+    sum += term.x * texelFetch(layers, ivec3(at, int(term.y)), 0).rgb;
   }
   result = vec4(sum, 1.0);
 }`;
@@ -755,7 +757,7 @@ function numberTexture(count, channels, width = 1024) {
   const columns = Math.min(Math.max(count, 1), width);
   const rows = Math.ceil(Math.max(count, 1) / columns);
   const data = new Float32Array(columns * rows * channels);
-  return new DataTexture(data, columns, rows, channels === 1 ? RedFormat : RGBAFormat, FloatType);
+  return new DataTexture(data, columns, rows, channels === 2 ? RGFormat : RGBAFormat, FloatType);
 }
 
 /** Layers and weights per facet: static texture, VDTM, DynTex. */
@@ -763,9 +765,10 @@ class LayerBlend {
   constructor(part) {
     this.part = part;
     this.slots = part.layers.length;
-    this.row = this.slots + 2;
+    this.row = this.slots + 1;
     this.array = emptyArray(part.size, this.slots);
-    this.weights = numberTexture(part.facets.length * this.row, 1);
+    this.weights = numberTexture(part.facets.length * this.row, 2);
+    this.sums = new Float64Array(this.slots);
     const [width, height] = part.size;
     const codes = new Uint8Array(4 * width * height);
     part.facetOfTexel.forEach((f, i) => {
@@ -811,33 +814,41 @@ class LayerBlend {
   /** Weights for an eye, into the texture of numbers. Colours are shares of 255 there. */
   draw(renderer, target, eye, ready) {
     const out = this.weights.image.data;
-    this.part.facets.forEach((facet, f) => this.#facet(facet, out, f * this.row, eye, ready));
+    this.part.facets.forEach((facet, f) => {
+      this.#weigh(facet, eye);
+      this.#write(out, 2 * f * this.row, Math.min(facet.rank, ready));
+    });
     this.weights.needsUpdate = true;
     this.pass.draw(renderer, target);
   }
 
-  #facet({ center, complex, rank, table }, out, start, eye, ready) {
-    const used = Math.min(rank, ready);
-    out.fill(0, start, start + this.row);
+  /** Weights of a facet's layers into `sums`. A facet without sites shows its first layer. */
+  #weigh({ center, complex, rank, table }, eye) {
+    this.sums.fill(0);
     if (complex.length === 0) {
-      out[start + 2] = 1;
-    } else {
-      complex.blend(eye.x - center[0], eye.y - center[1], eye.z - center[2]);
-      for (let n = 0; n < 3; n++) {
-        const share = complex.shares[n];
-        if (!(share > 0)) continue;
-        const from = complex.picked[n] * rank;
-        for (let k = 0; k < used; k++) out[start + 2 + k] += share * table[from + k];
-      }
+      this.sums[0] = 1;
+      return;
     }
-    let bias = 0;
+    complex.blend(eye.x - center[0], eye.y - center[1], eye.z - center[2]);
+    for (let n = 0; n < 3; n++) {
+      const from = complex.picked[n] * rank;
+      for (let k = 0; complex.shares[n] > 0 && k < rank; k++) this.sums[k] += complex.shares[n] * table[from + k];
+    }
+  }
+
+  /** Writes what is not zero of the first `used` sums: gains and layers, behind their count and common bias. */
+  #write(out, start, used) {
+    let [at, bias] = [start, 0];
     for (let k = 0; k < used; k++) {
+      if (this.sums[k] === 0) continue;
       const { scale, offset } = this.part.layers[k];
-      bias += out[start + 2 + k] * offset;
-      out[start + 2 + k] *= scale;
+      at += 2;
+      out[at] = this.sums[k] * scale;
+      out[at + 1] = k;
+      bias += this.sums[k] * offset;
     }
     out[start] = bias / 255;
-    out[start + 1] = used;
+    out[start + 1] = (at - start) / 2;
   }
 
   dispose() {

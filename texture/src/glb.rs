@@ -11,7 +11,6 @@ use crate::directions::{DirectionComplex, Layout};
 use crate::layers::{FacetWeights, Layer, Layers};
 use crate::model::{Appearance, FitOptions, Method, Model};
 use crate::surface::{self, SurfaceTexels};
-use capture::Image;
 use geometry::{Mesh, TexturedMesh};
 use gltf::binary::{Glb, Header};
 use nalgebra::{Point2, Point3, Vector3};
@@ -230,22 +229,13 @@ fn write_layers(w: &mut Writer, model: &Model, layers: &Layers) -> Option<(Exten
     e.ring_axis = layers.facets.iter().find_map(|f| f.complex.ring()).map(Into::into);
     write_facets(w, &mut e, &layers.facets)?;
     let preview = match model.method {
-        Method::Vdtm => w.image(&mean_of_layers(layers)?, "preview".to_owned()),
+        Method::Vdtm => {
+            let preview = base_layer(&layers.mean(), &FitOptions::default())?;
+            w.image(&preview.coded, "preview".to_owned())
+        }
         _ => e.layers.first()?.image,
     };
     Some((e, preview))
-}
-
-fn mean_of_layers(layers: &Layers) -> Option<Vec<u8>> {
-    let size = (layers.facet_of_texel.width(), layers.facet_of_texel.height());
-    let mut mean = Image::filled(size.0, size.1, [0.0f32; 3]);
-    let share = 1.0 / layers.layers.len().max(1) as f32;
-    for layer in &layers.layers {
-        for (m, t) in mean.pixels_mut().iter_mut().zip(layer.texels.pixels()) {
-            m.iter_mut().zip(t).for_each(|(m, &t)| *m += share * f32::from(t));
-        }
-    }
-    Some(base_layer(&mean, &FitOptions::default())?.coded)
 }
 
 fn write_facets(w: &mut Writer, e: &mut Extension, facets: &[FacetWeights]) -> Option<()> {

@@ -152,6 +152,16 @@ impl Model {
         }
     }
 
+    /// The texture that viewers without our extension show, in levels of 0..=255: the first layer of a static texture and
+    /// of DynTex, the mean of the layers of VDTM, of the rays of a lumigraph.
+    pub fn still(&self) -> Image<[f32; 3]> {
+        match &self.appearance {
+            Appearance::Layers(layers) if self.method == Method::Vdtm => layers.mean(),
+            Appearance::Layers(layers) => layers.first(),
+            Appearance::Lumigraph(rays, surface) => rays.mean(surface),
+        }
+    }
+
     /// The model as one binary glTF (`docs/model-format.md`).
     ///
     /// # Errors

@@ -5,6 +5,7 @@ pub(crate) mod btf;
 pub(crate) mod capture;
 pub(crate) mod compare;
 pub(crate) mod demo;
+pub(crate) mod export;
 pub(crate) mod hull;
 pub(crate) mod import;
 pub(crate) mod info;
@@ -13,6 +14,7 @@ pub(crate) mod render;
 pub(crate) mod synth;
 mod synth_film;
 pub(crate) mod turntable;
+pub(crate) mod view;
 
 use crate::arguments::{CaptureArgs, FitArgs, MeshArgs, MethodArg, ShapeArgs};
 use std::path::Path;
