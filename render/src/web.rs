@@ -24,11 +24,7 @@ const SCRIPT: &str = "text/javascript; charset=utf-8";
 
 /// The player without a model.
 pub const FILES: [WebFile; 6] = [
-    WebFile {
-        path: "index.html",
-        media_type: "text/html; charset=utf-8",
-        bytes: include_bytes!("../web/index.html"),
-    },
+    WebFile { path: "index.html", media_type: "text/html; charset=utf-8", bytes: include_bytes!("../web/index.html") },
     WebFile { path: "style.css", media_type: "text/css; charset=utf-8", bytes: include_bytes!("../web/style.css") },
     WebFile { path: "player.js", media_type: SCRIPT, bytes: include_bytes!("../web/player.js") },
     WebFile { path: "turnlight-loader.js", media_type: SCRIPT, bytes: include_bytes!("../web/turnlight-loader.js") },
@@ -52,7 +48,9 @@ mod tests {
     #[test]
     fn every_import_of_the_page_is_in_its_folder() {
         for file in FILES.iter().filter(|file| file.media_type == SCRIPT && !file.path.starts_with("vendor/")) {
-            for line in text(file.path).lines().filter(|line| line.starts_with("import ") || line.starts_with("} from ")) {
+            for line in
+                text(file.path).lines().filter(|line| line.starts_with("import ") || line.starts_with("} from "))
+            {
                 let Some((_, rest)) = line.split_once(" from '") else { continue };
                 let name = rest.trim_end_matches("';");
                 let is_here = name.strip_prefix("./").is_some_and(|path| FILES.iter().any(|file| file.path == path));

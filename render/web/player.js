@@ -102,25 +102,60 @@ class Stage {
 // ---------------------------------------------------------------------------------------------------------
 // Loading
 
-/** Bytes of the file as they come; `onprogress(bytes so far, share or null)`. */
-async function download(address, onprogress) {
+/** A file as it arrives. */
+class Arrival {
+  constructor(total) {
+    this.bytes = new Uint8Array(total || 2 ** 20);
+    this.at = 0;
+    this.waiting = [];
+  }
+
+  add(part) {
+    if (this.at + part.length > this.bytes.length) {
+      const more = new Uint8Array(Math.max(2 * this.bytes.length, this.at + part.length));
+      more.set(this.sofar);
+      this.bytes = more;
+    }
+    this.bytes.set(part, this.at);
+    this.at += part.length;
+    this.waiting = this.waiting.filter(({ end, resolve }) => end > this.at || resolve());
+  }
+
+  get sofar() {
+    return this.bytes.subarray(0, this.at);
+  }
+
+  /** Some bytes, once they are here. */
+  async range(start, count) {
+    if (start + count > this.at) await new Promise((resolve, reject) => this.waiting.push({ end: start + count, resolve, reject }));
+    return this.bytes.subarray(start, start + count);
+  }
+
+  /** Nothing more comes. */
+  end() {
+    this.waiting.forEach(({ reject }) => reject(cutOff()));
+    this.waiting = [];
+  }
+}
+
+const cutOff = () => new ModelError('it is cut off');
+
+/** The file at `address`, part by part; `onpart(arrival, share or null)`. */
+async function download(address, onpart) {
   const response = await fetch(address).catch(() => null);
   if (!response?.ok) throw new ModelError(`${address} is not there (${response ? response.status : 'no answer'})`);
   const total = Number(response.headers.get('content-length')) || 0;
-  let bytes = new Uint8Array(total || 2 ** 20);
-  let at = 0;
+  const arrival = new Arrival(total);
   const reader = response.body.getReader();
-  for (let step = await reader.read(); !step.done; step = await reader.read()) {
-    if (at + step.value.length > bytes.length) {
-      const more = new Uint8Array(Math.max(2 * bytes.length, at + step.value.length));
-      more.set(bytes.subarray(0, at));
-      bytes = more;
+  try {
+    for (let step = await reader.read(); !step.done; step = await reader.read()) {
+      arrival.add(step.value);
+      await onpart(arrival, total ? arrival.at / total : null);
     }
-    bytes.set(step.value, at);
-    at += step.value.length;
-    await onprogress(bytes.subarray(0, at), total ? at / total : null);
+  } finally {
+    arrival.end();
   }
-  return bytes.slice(0, at);
+  return arrival;
 }
 
 /** The JSON of a binary glTF and where its data begin; null while it has not all come. */
@@ -137,37 +172,52 @@ function header(bytes) {
   } catch {
     throw new ModelError('its description does not parse');
   }
-  return { json, start: 28 + length };
+  return { json, start: 28 + length, length: data.getUint32(8, true) };
 }
 
 /** Refuses what no model of ours looks like, before any of it is used. */
 function checkShape({ json }) {
+  if (typeof json !== 'object' || json === null || !json.asset?.version) throw new ModelError('its description is no glTF');
   checkContainer(json);
-  const lone = ['scenes', 'nodes', 'meshes', 'materials'].find((part) => json[part]?.length !== 1);
-  if (lone) throw new ModelError(`it has ${json[lone]?.length ?? 'no'} ${lone}, where a model has one`);
-  if (json.nodes[0].children || json.meshes[0].primitives?.length !== 1) throw new ModelError('it is more than one mesh');
+  const lone = ['scenes', 'nodes', 'meshes', 'materials'].find((part) => json[part]?.length !== 1 || !json[part][0]);
+  if (lone) throw new ModelError(`of ${lone} it has none or several, where a model has one`);
   if (!json.materials[0].extensions?.[EXTENSION]) throw new ModelError(`its material has no extension ${EXTENSION}`);
+  const [node, primitives] = [json.nodes[0], json.meshes[0].primitives];
+  const extra = ['animations', 'skins', 'cameras'].find((part) => part in json);
+  if (extra) throw new ModelError(`it has ${extra}, which a model has not`);
+  const isPlain = Object.keys(node).every((key) => ['mesh', 'name'].includes(key)) && node.mesh === 0;
+  const isAlone = primitives?.length === 1 && primitives[0] && !primitives[0].targets && !json.meshes[0].weights;
+  const isSeen = (json.scene ?? 0) === 0 && JSON.stringify(json.scenes[0].nodes) === '[0]';
+  if (!isPlain || !isAlone || !isSeen) throw new ModelError('it is more than one mesh where it was photographed');
   if (json.extensionsRequired?.length) throw new ModelError(`it needs the extension ${json.extensionsRequired[0]}`);
 }
 
 /**
- * The file up to the end of its mesh and its one picture, as a file of its own; null while they have not all
- * come. DynTex keeps its picture right behind the mesh, so it is seen long before the basis.
+ * Where all that is not a layer ends: mesh, picture, facets and their weights. From there on the model can be shown,
+ * and its layers as they arrive. The end of the file where that cannot be told: the fault is named then.
  */
-function firstLook(bytes, { json, start }) {
-  const primitive = json.meshes[0].primitives[0];
-  const accessors = [primitive.attributes?.POSITION, primitive.attributes?.TEXCOORD_0, primitive.indices];
+function endOfFirstLook({ json, start, length }) {
+  const e = json.materials[0].extensions[EXTENSION];
+  const { attributes, indices } = json.meshes[0].primitives[0];
   const texture = json.materials[0].pbrMetallicRoughness?.baseColorTexture?.index;
-  const views = [...accessors.map((i) => json.accessors?.[i]?.bufferView), json.images?.[json.textures?.[texture]?.source]?.bufferView];
-  const ends = views.map((i) => json.bufferViews?.[i]).map((view) => (view?.byteOffset ?? 0) + view?.byteLength);
-  const end = start + 4 * Math.ceil(Math.max(...ends) / 4);
-  // Also false where something is missing: the fault is named once the whole file is there.
-  if (!(bytes.length >= end)) return null;
-  const look = bytes.slice(0, end);
-  const data = new DataView(look.buffer);
-  data.setUint32(8, end, true);
-  data.setUint32(start - 8, end - start, true);
-  return look;
+  const accessors = [attributes?.POSITION, attributes?.TEXCOORD_0, indices, e.facets, e.facetCenters, e.directions];
+  accessors.push(e.triangles, e.edges, e.coefficients, e.cameraCenters);
+  const images = [json.textures?.[texture]?.source, e.facetMap];
+  const views = [[accessors, json.accessors], [images, json.images]].flatMap(([numbers, parts]) =>
+    numbers.filter((i) => i !== undefined).map((i) => json.bufferViews?.[parts?.[i]?.bufferView]),
+  );
+  const end = start + Math.max(...views.map((view) => (view?.byteOffset ?? 0) + view?.byteLength));
+  return end <= length ? end : length;
+}
+
+/** The first bytes of a model as a binary glTF of their own. */
+function beginning(bytes, { start }, end) {
+  const first = new Uint8Array(start + 4 * Math.ceil((end - start) / 4));
+  first.set(bytes.subarray(0, end));
+  const data = new DataView(first.buffer);
+  data.setUint32(8, first.length, true);
+  data.setUint32(start - 8, first.length - start, true);
+  return first;
 }
 
 async function parse(loader, bytes) {
@@ -187,7 +237,6 @@ class Player {
     this.camera = new PerspectiveCamera(FIELD_OF_VIEW_DEG, 1, 0.01, 100);
     this.takeControls();
     this.exact = null;
-    this.isTouched = false;
     this.isStale = true;
     this.side = Number(query.get('supersample')) || (devicePixelRatio > 1.5 ? 1 : 2);
     this.times = [];
@@ -228,18 +277,15 @@ class Player {
     this.isStale = true;
   }
 
-  /** Puts a loaded model on the stage, in the place of the last. */
+  /** Puts a loaded model on the stage. */
   show(gltf) {
     const [appearance] = gltf.userData.turnlight;
-    this.stage.scene.clear();
     this.stage.scene.add(gltf.scene);
-    this.appearance?.dispose();
     this.appearance = appearance;
     appearance.material.uniforms.encoded.value = true;
     appearance.onchange = () => (this.isStale = true);
     gltf.scene.traverse((o) => o.isMesh && this.enclose(o.geometry));
-    if (!this.isTouched) this.home();
-    this.isStale = true;
+    this.home();
   }
 
   enclose(geometry) {
@@ -263,7 +309,6 @@ class Player {
     Object.assign(this.controls, { minDistance: 1.05 * radius, maxDistance: 40 * radius });
     this.controls.target.copy(center);
     this.controls.update();
-    this.isTouched = false;
     this.isStale = true;
   }
 
@@ -275,7 +320,6 @@ class Player {
     Object.assign(this.controls, { enableDamping: true, dampingFactor: 0.06, rotateSpeed: 0.7 });
     Object.assign(this.controls, { autoRotate, autoRotateSpeed: 60 / TURN_SECONDS, enablePan: false });
     this.controls.addEventListener('change', () => (this.isStale = true));
-    this.controls.addEventListener('start', () => (this.isTouched = true));
   }
 
   /** Turns by steps, right and up. */
@@ -286,7 +330,6 @@ class Player {
     const polar = arm.angleTo(this.camera.up);
     arm.applyAxisAngle(side, Math.min(Math.max(polar - up * STEP, 1e-3), Math.PI - 1e-3) - polar);
     this.camera.position.copy(target).add(arm.applyAxisAngle(this.camera.up, right * STEP));
-    this.isTouched = true;
   }
 
   toggleLook() {
@@ -469,26 +512,31 @@ async function start() {
 
 async function load(player) {
   const mostBytes = (Number(query.get('memory')) || 512) * 2 ** 20;
-  const reader = (options) => new GLTFLoader().register((parser) => new TurnlightPlugin(parser, options));
-  let [head, look] = [null, null];
-  const bytes = await download(MODEL, async (sofar, share) => {
+  let [head, shown] = [null, null];
+  const show = async (arrival, end) => {
+    const source = (start, count) => arrival.range(head.start + start, count);
+    const options = { mostBytes, source, length: head.length - head.start };
+    const loader = new GLTFLoader().register((parser) => new TurnlightPlugin(parser, options));
+    player.show(await parse(loader, beginning(arrival.sofar, head, end)));
+    $('panel').hidden = $('tools').hidden = false;
+    $('look').hidden = player.appearance.total === 1;
+  };
+  const arrival = await download(MODEL, async (arrival, share) => {
     $('done').style.width = `${100 * (share ?? 0.5)}%`;
-    if (head === null && (head = header(sofar))) checkShape(head);
-    if (head === null || look !== null || share === 1) return;
-    look = firstLook(sofar, head);
-    if (look !== null) player.show(await parse(reader({ isStill: true }), look));
+    if (head === null && (head = header(arrival.sofar))) checkShape(head);
+    if (head === null || shown !== null) return;
+    const end = endOfFirstLook(head);
+    if (arrival.at >= end) await (shown = show(arrival, end));
   });
-  if (head === null || new DataView(bytes.buffer).getUint32(8, true) !== bytes.length) throw new ModelError('it is cut off');
-  player.show(await parse(reader({ mostBytes }), bytes));
+  if (head === null || arrival.at !== head.length) throw cutOff();
+  await (shown ?? show(arrival, arrival.at));
   $('loading').hidden = true;
-  $('panel').hidden = $('tools').hidden = false;
-  $('look').hidden = player.appearance.total === 1;
   if (query.has('camera')) player.setCamera(JSON.parse(query.get('camera')));
 }
 
 const ready = start();
 window.turnlight = {
-  /** Resolves when the static look is on the screen; rejects where the model is refused. */
+  /** Resolves when the whole file has come and its static look is on the screen; rejects where the model is refused. */
   ready: ready.then(() => undefined),
   /** Resolves when every layer is on the GPU, or when it is known that they will not be. */
   complete: async () => {

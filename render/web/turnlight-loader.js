@@ -74,7 +74,9 @@ export class ModelError extends Error {}
 export class TurnlightPlugin {
   /**
    * `options.mostBytes`: texture memory that an appearance may take on the GPU; 512 MiB unless told.
-   * `options.isStill`: read the mesh and its one picture alone; the rest of the file need not be there.
+   * `options.source`, with `options.length`: for a file that is still arriving. What is parsed is then its beginning,
+   * up to all that is not a layer; the binary chunk will have `length` bytes, and `await source(start, count)` gives
+   * some of them.
    */
   constructor(parser, options = {}) {
     this.name = EXTENSION;
@@ -92,8 +94,8 @@ export class TurnlightPlugin {
     const body = extensions.KHR_binary_glTF?.body;
     if (!body) throw new ModelError('it is no binary glTF with all its data inside');
     checkContainer(json);
-    const reader = new Reader(json, body);
-    for (const index of carriers) this.parts.set(index, await readExtension(reader, index, this.options));
+    const reader = new Reader(json, body, this.options);
+    for (const index of carriers) this.parts.set(index, await readExtension(reader, index));
   }
 
   /** Hands the meshes their appearances. */
@@ -136,20 +138,27 @@ export function checkContainer(json) {
 
 /** Bytes of a binary glTF by the numbers of its JSON. */
 class Reader {
-  constructor(json, body) {
+  constructor(json, body, { source, length }) {
     this.json = json;
     this.body = body;
+    this.source = source;
+    this.length = length ?? body.byteLength;
   }
 
-  view(index) {
+  /** Where a buffer view begins, and how long it is. */
+  range(index) {
     const view = list(this.json.bufferViews)[index];
     if (typeof view !== 'object' || view === null) throw new ModelError(`buffer view ${index} is missing`);
     const [start, length] = [view.byteOffset ?? 0, view.byteLength];
     if (view.buffer !== 0) throw new ModelError(`buffer view ${index} lies in another buffer`);
     if (!isIndex(start) || !isIndex(length)) throw new ModelError(`buffer view ${index} has no range`);
-    if (start + length > this.body.byteLength) {
-      throw new ModelError(`buffer view ${index} reaches past the end of the file`);
-    }
+    if (start + length > this.length) throw new ModelError(`buffer view ${index} reaches past the end of the file`);
+    return [start, length];
+  }
+
+  view(index) {
+    const [start, length] = this.range(index);
+    if (start + length > this.body.byteLength) throw new ModelError(`buffer view ${index} has not arrived`);
     return new Uint8Array(this.body, start, length);
   }
 
@@ -186,16 +195,34 @@ class Reader {
 
   /** The bytes of an image, whose header must say `size`. */
   image(index, size, what) {
+    return checkImage(this.view(this.#viewOfImage(index, what)), size, what);
+  }
+
+  /** The same for one that may not have arrived: a function that waits for it. */
+  imageLater(index, size, what) {
+    const view = this.#viewOfImage(index, what);
+    if (!this.source) {
+      const bytes = this.image(index, size, what);
+      return async () => bytes;
+    }
+    const range = this.range(view);
+    return async () => checkImage(await this.source(...range), size, what);
+  }
+
+  #viewOfImage(index, what) {
     const image = isIndex(index) ? list(this.json.images)[index] : undefined;
     if (!isIndex(image?.bufferView)) throw new ModelError(`${what} is not inside the file`);
-    const bytes = this.view(image.bufferView);
-    const [width, height] = sizeOfImage(bytes) ?? [];
-    if (width === undefined) throw new ModelError(`${what} is neither PNG nor JPEG`);
-    if (width !== size[0] || height !== size[1]) {
-      throw new ModelError(`${what} is ${width}×${height} where ${size[0]}×${size[1]} is declared`);
-    }
-    return bytes;
+    return image.bufferView;
   }
+}
+
+function checkImage(bytes, size, what) {
+  const [width, height] = sizeOfImage(bytes) ?? [];
+  if (width === undefined) throw new ModelError(`${what} is neither PNG nor JPEG`);
+  if (width !== size[0] || height !== size[1]) {
+    throw new ModelError(`${what} is ${width}×${height} where ${size[0]}×${size[1]} is declared`);
+  }
+  return bytes;
 }
 
 /** Width and height that the header of a PNG or JPEG declares. */
@@ -215,7 +242,7 @@ function sizeOfImage(bytes) {
 }
 
 /** What the extension of material `index` says, in arrays that can be trusted; images still coded. */
-async function readExtension(reader, index, { isStill = false }) {
+async function readExtension(reader, index) {
   const material = reader.json.materials[index];
   const e = material.extensions[EXTENSION];
   if (e.version !== VERSION) throw new ModelError(`version ${e.version} of the extension; this player reads version ${VERSION}`);
@@ -225,11 +252,10 @@ async function readExtension(reader, index, { isStill = false }) {
   if (!Array.isArray(size) || size.length !== 2 || !size.every(isSide) || size[0] * size[1] > MOST_TEXELS) {
     throw new ModelError(`an atlas of ${JSON.stringify(size)} texels`);
   }
+  refuseSharedImages(reader, e);
   const texture = material.pbrMetallicRoughness?.baseColorTexture?.index;
   reader.image(list(reader.json.textures)[texture]?.source, size, 'its preview');
-  const part = { method: e.method, size, texture, mesh: readMesh(reader, index), isStill };
-  if (isStill) return part;
-  refuseSharedImages(reader, e);
+  const part = { method: e.method, size, texture, mesh: readMesh(reader, index) };
   if (e.method === 'lumigraph') return Object.assign(part, readRays(reader, e, size));
   return Object.assign(part, await readLayers(reader, e, size));
 }
@@ -238,8 +264,9 @@ async function readExtension(reader, index, { isStill = false }) {
 function refuseSharedImages(reader, e) {
   const images = [...list(e.layers).map((l) => l?.image), ...list(e.rays).flatMap((r) => [r?.color, r?.view])];
   let bytes = 0;
-  for (const image of images) bytes += reader.view(list(reader.json.images)[image]?.bufferView).length;
-  if (bytes > reader.body.byteLength) throw new ModelError('its layers share images');
+  for (const image of images) bytes += list(reader.json.bufferViews)[list(reader.json.images)[image]?.bufferView]?.byteLength ?? 0;
+  // What is missing counts nothing here, and is named when it is read; so is what is no number.
+  if (!(bytes <= reader.length)) throw new ModelError('its layers share images');
 }
 
 /** Positions, texture coordinates and faces of the one primitive that wears material `index`. */
@@ -262,10 +289,10 @@ function readMesh(reader, index) {
 
 async function readLayers(reader, e, size) {
   const layers = list(e.layers).map((layer, k) => {
-    if (!Number.isFinite(layer.scale) || !Number.isFinite(layer.offset)) {
+    if (!Number.isFinite(layer?.scale) || !Number.isFinite(layer?.offset)) {
       throw new ModelError(`layer ${k} has a scale or offset that is no number`);
     }
-    return { bytes: reader.image(layer.image, size, `layer ${k}`), scale: layer.scale, offset: layer.offset };
+    return { read: reader.imageLater(layer.image, size, `layer ${k}`), scale: layer.scale, offset: layer.offset };
   });
   if (layers.length === 0) throw new ModelError('it has no layers');
   const facets = readFacets(reader, e, layers.length);
@@ -323,8 +350,8 @@ const snorm = (v) => Math.max(v / 32767, -1);
 function readRays(reader, e, size) {
   const centers = reader.floats(e.cameraCenters, 'VEC3', 3, 'camera centres');
   const rays = list(e.rays).map((ray, k) => ({
-    color: reader.image(ray.color, size, `ray colours ${k}`),
-    view: reader.image(ray.view, size, `ray views ${k}`),
+    color: reader.imageLater(ray?.color, size, `ray colours ${k}`),
+    view: reader.imageLater(ray?.view, size, `ray views ${k}`),
   }));
   if (rays.length === 0) throw new ModelError('it has no rays');
   return { rays, centers };
@@ -800,7 +827,7 @@ class LayerBlend {
   }
 
   async decode(k) {
-    const bytes = this.part.layers[k].bytes;
+    const bytes = await this.part.layers[k].read();
     const options = { colorSpaceConversion: 'none', premultiplyAlpha: 'none' };
     const bitmap = await createImageBitmap(new Blob([bytes]), options).catch(() => {
       throw new ModelError(`layer ${k} cannot be decoded`);
@@ -898,7 +925,8 @@ class RayBlend {
 
   async decode(k) {
     const { size, rays } = this.part;
-    const [color, view] = [await decodePng(rays[k].color, size, `ray colours ${k}`), await decodePng(rays[k].view, size, `ray views ${k}`)];
+    const color = await decodePng(await rays[k].color(), size, `ray colours ${k}`);
+    const view = await decodePng(await rays[k].view(), size, `ray views ${k}`);
     const texels = size[0] * size[1];
     const [packed, high] = [new Uint8Array(4 * texels), this.high && new Uint8Array(texels)];
     const views = this.part.centers.length / 3;
@@ -1073,7 +1101,7 @@ export class Appearance {
 
   /** Layers, or rays per texel. */
   get total() {
-    return (this.part.layers ?? this.part.rays ?? []).length;
+    return (this.part.layers ?? this.part.rays).length;
   }
 
   /** Whether what is on the screen depends on the eye. */
@@ -1088,7 +1116,7 @@ export class Appearance {
       const middle = [0, 1, 2].map((k) => p.reduce((sum, v, i) => (i % 3 === k ? sum + v : sum), 0) / (p.length / 3));
       return Array.from({ length: c.length / 3 }, (_, i) => new Vector3(...middle.map((m, k) => c[3 * i + k] - m)).normalize());
     }
-    const complexes = (this.part.facets ?? []).map((f) => f.complex);
+    const complexes = this.part.facets.map((f) => f.complex);
     const most = complexes.reduce((a, b) => (b.length > a.length ? b : a), complexes[0]);
     return Array.from({ length: most?.length ?? 0 }, (_, i) => new Vector3(...most.site(i)));
   }
@@ -1106,7 +1134,7 @@ export class Appearance {
 
   /** Makes the atlas for an eye in the coordinates of the mesh, unless it is that already. */
   update(renderer, eye, camera) {
-    if (this.blend === undefined && this.notice === null && !this.part.isStill) this.#prepare(renderer);
+    if (this.blend === undefined && this.notice === null) this.#prepare(renderer);
     const isNew = this.#upload(renderer);
     const { atlas, padded } = this.material.uniforms;
     if (!this.isPlaying) {

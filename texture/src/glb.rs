@@ -217,33 +217,36 @@ fn blank(model: &Model) -> Extension {
     }
 }
 
-/// Writes layers and weights; also gives the image that plain viewers show.
+/// Writes layers and weights; also gives the image that plain viewers show. What a first look and all weights need comes
+/// first: a player in a browser shows that while the other layers are on their way.
 fn write_layers(w: &mut Writer, model: &Model, layers: &Layers) -> Option<(Extension, usize)> {
     let mut e = blank(model);
-    for (k, layer) in layers.layers.iter().enumerate() {
-        let image = w.part_image(&layer.coded, format!("layer {k}"));
-        e.layers.push(LayerEntry { image, scale: layer.scale, offset: layer.offset });
-    }
+    let (first, rest) = layers.layers.split_first()?;
+    let preview = match model.method {
+        Method::Vdtm => Some(w.image(&base_layer(&layers.mean(), &FitOptions::default())?.coded, "preview".to_owned())),
+        _ => None,
+    };
+    write_layer(w, &mut e, first);
     let map = layers.facet_of_texel.map(|f| [f.to_le_bytes()[0], f.to_le_bytes()[1], 0]);
     e.facet_map = Some(w.part_image(&coding::encode_png(&map)?, "facet map".to_owned()));
     e.ring_axis = layers.facets.iter().find_map(|f| f.complex.ring()).map(Into::into);
-    write_facets(w, &mut e, &layers.facets)?;
-    let preview = match model.method {
-        Method::Vdtm => {
-            let preview = base_layer(&layers.mean(), &FitOptions::default())?;
-            w.image(&preview.coded, "preview".to_owned())
-        }
-        _ => e.layers.first()?.image,
-    };
+    write_facets(w, &mut e, &layers.facets, layers.layers.len())?;
+    rest.iter().for_each(|layer| write_layer(w, &mut e, layer));
+    let preview = preview.or(e.layers.first().map(|layer| layer.image))?;
     Some((e, preview))
 }
 
-fn write_facets(w: &mut Writer, e: &mut Extension, facets: &[FacetWeights]) -> Option<()> {
-    let is_sound = |f: &FacetWeights| f.rank <= e.layers.len() && f.table.len() == f.rank * f.complex.sites().len();
+fn write_layer(w: &mut Writer, e: &mut Extension, layer: &Layer) {
+    let image = w.part_image(&layer.coded, format!("layer {}", e.layers.len()));
+    e.layers.push(LayerEntry { image, scale: layer.scale, offset: layer.offset });
+}
+
+fn write_facets(w: &mut Writer, e: &mut Extension, facets: &[FacetWeights], layers: usize) -> Option<()> {
+    let is_sound = |f: &FacetWeights| f.rank <= layers && f.table.len() == f.rank * f.complex.sites().len();
     if !facets.iter().all(is_sound) {
         return None;
     }
-    let scales = coefficient_scales(facets, e.layers.len());
+    let scales = coefficient_scales(facets, layers);
     let (mut counts, mut centers, mut directions) = (Vec::new(), Vec::new(), Vec::new());
     let (mut triangles, mut edges, mut coefficients) = (Vec::new(), Vec::new(), Vec::new());
     for f in facets {
@@ -314,16 +317,16 @@ fn write_lumigraph(
     surface: &SurfaceTexels,
 ) -> Option<(Extension, usize)> {
     let mut e = blank(model);
+    let preview = base_layer(&rays.mean(surface), &FitOptions::default())?;
+    let preview = w.image(&preview.coded, "preview".to_owned());
+    let centers: Vec<u8> =
+        rays.centers.iter().flat_map(|c| [c.x, c.y, c.z]).flat_map(|v| (v as f32).to_le_bytes()).collect();
+    e.camera_centers = w.part(&centers, FLOAT, "VEC3", rays.centers.len());
     for (k, pair) in rays.coded.chunks_exact(2).enumerate() {
         let color = w.part_image(&pair[0], format!("ray colours {k}"));
         let view = w.part_image(&pair[1], format!("ray views {k}"));
         e.rays.push(RayEntry { color, view });
     }
-    let centers: Vec<u8> =
-        rays.centers.iter().flat_map(|c| [c.x, c.y, c.z]).flat_map(|v| (v as f32).to_le_bytes()).collect();
-    e.camera_centers = w.part(&centers, FLOAT, "VEC3", rays.centers.len());
-    let preview = base_layer(&rays.mean(surface), &FitOptions::default())?;
-    let preview = w.image(&preview.coded, "preview".to_owned());
     Some((e, preview))
 }
 

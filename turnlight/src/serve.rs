@@ -8,8 +8,8 @@ use crate::Error;
 use crate::export::web::{Site, SiteFile};
 use std::io::{self, Read, Write};
 use std::net::{Ipv4Addr, SocketAddr, TcpListener, TcpStream};
-use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
 /// Longest request that is read; browsers send a few hundred bytes.

@@ -4,10 +4,10 @@ use super::read_file;
 use crate::Answer;
 use crate::arguments::{ExportArgs, ExportTarget};
 use serde_json::json;
+use turnlight::Error;
 use turnlight::export::{obj, web::Site};
 use turnlight::output::OutputFolder;
 use turnlight::texture::Model;
-use turnlight::Error;
 
 pub(crate) fn run(args: &ExportArgs) -> Result<Answer, Error> {
     let bytes = read_file(&args.model)?;
