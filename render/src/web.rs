@@ -14,6 +14,9 @@ pub struct WebFile {
     pub bytes: &'static [u8],
 }
 
+/// The page itself.
+pub const PAGE: &str = "index.html";
+
 /// Where the page looks for its model.
 pub const MODEL: &str = "model.glb";
 
@@ -24,7 +27,7 @@ const SCRIPT: &str = "text/javascript; charset=utf-8";
 
 /// The player without a model.
 pub const FILES: [WebFile; 6] = [
-    WebFile { path: "index.html", media_type: "text/html; charset=utf-8", bytes: include_bytes!("../web/index.html") },
+    WebFile { path: PAGE, media_type: "text/html; charset=utf-8", bytes: include_bytes!("../web/index.html") },
     WebFile { path: "style.css", media_type: "text/css; charset=utf-8", bytes: include_bytes!("../web/style.css") },
     WebFile { path: "player.js", media_type: SCRIPT, bytes: include_bytes!("../web/player.js") },
     WebFile { path: "turnlight-loader.js", media_type: SCRIPT, bytes: include_bytes!("../web/turnlight-loader.js") },

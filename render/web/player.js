@@ -1,7 +1,7 @@
 // The page: loads model.glb beside it, shows it, lets it be turned.
 //
 // Options in the address: ?camera={…} an exact camera as JSON (see `setCamera`), ?up=y the axis that points up
-// (x, y, z, -x, -y, -z; the ring's or z unless told), ?supersample=N sub-samples along a pixel's side,
+// (x, y, z, -x, -y, -z; what the export was told, else the ring's, else z), ?supersample=N sub-samples along a pixel's side,
 // ?memory=MIB of textures that the model may take.
 //
 // Programs find `window.turnlight`: `ready` (a promise), `setCamera`, `screenshot`, `benchmark`, `state`.
@@ -31,6 +31,8 @@ const NAMES = { static: 'Static texture', vdtm: 'View-dependent texture mapping 
 const BACKGROUND = [27, 29, 33];
 const FIELD_OF_VIEW_DEG = 30;
 const TURN_SECONDS = 12;
+/** Sine of an elevation that does not tell above from below. */
+const LEVEL = 0.1;
 /** Radians that an arrow key turns by. */
 const STEP = Math.PI / 36;
 const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
@@ -298,7 +300,7 @@ class Player {
   home() {
     if (!this.sphere) return;
     const { center, radius } = this.sphere;
-    const up = axis(query.get('up')) ?? ringUp(this.appearance) ?? new Vector3(0, 0, 1);
+    const up = axis(query.get('up') ?? document.body.dataset.up) ?? ringUp(this.appearance) ?? new Vector3(0, 0, 1);
     const from = this.appearance.directions[0] ?? new Vector3(1, -1, 0.6).normalize();
     const distance = (1.08 * radius) / Math.sin((FIELD_OF_VIEW_DEG * Math.PI) / 360);
     this.camera.up.copy(up);
@@ -446,12 +448,13 @@ function axis(name) {
   return new Vector3(...['x', 'y', 'z'].map((a) => (a === match[2] ? (match[1] ? -1 : 1) : 0)));
 }
 
-/** The axis of a turntable, turned to the side from which the object was seen. */
+/** The axis of a turntable, turned to the side from which the object was seen; towards z where that was from level. */
 function ringUp(appearance) {
   const ring = appearance.part.ringAxis;
   if (!ring) return null;
-  const mean = appearance.directions.reduce((sum, d) => sum.add(d), new Vector3());
-  return ring.clone().multiplyScalar(ring.dot(mean) < 0 ? -1 : 1);
+  const { directions } = appearance;
+  const height = directions.reduce((sum, d) => sum + ring.dot(d), 0) / Math.max(directions.length, 1);
+  return ring.clone().multiplyScalar((Math.abs(height) > LEVEL ? height : ring.z) < 0 ? -1 : 1);
 }
 
 /** A camera of three from one of a transforms.json. */

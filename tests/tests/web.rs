@@ -74,11 +74,14 @@ fn frame(camera: &Camera) -> Value {
     })
 }
 
-/// Chromium, where it and node are installed.
+/// Chromium, where it and node are installed; `TURNLIGHT_CHROMIUM` names another.
 fn chromium() -> Option<PathBuf> {
     let path = std::env::var_os("PATH")?;
     let find = |name: &str| std::env::split_paths(&path).map(|folder| folder.join(name)).find(|file| file.is_file());
     find("node")?;
+    if let Some(named) = std::env::var_os("TURNLIGHT_CHROMIUM") {
+        return Some(named.into());
+    }
     ["chromium", "chromium-browser", "google-chrome"].into_iter().find_map(find)
 }
 

@@ -373,6 +373,13 @@ impl<'a> Reader<'a> {
         Ok((&bytes[..length], count))
     }
 
+    /// Refuses a file whose data lie elsewhere: no address is followed, so none may be meant.
+    fn refuse_addresses(&self) -> Result<(), String> {
+        let mut parts = ["buffers", "images"].into_iter().filter_map(|kind| self.root[kind].as_array()).flatten();
+        let has_address = parts.any(|part| part.get("uri").is_some());
+        if has_address { Err("it names other files, which is not followed".to_owned()) } else { Ok(()) }
+    }
+
     /// Refuses layers that decode the same bytes again and again: a small file could ask for any memory.
     fn refuse_shared_images(&self, e: &Extension) -> Result<(), String> {
         let rays = e.rays.iter().flat_map(|ray| [ray.color, ray.view]);
@@ -434,6 +441,7 @@ pub(crate) fn read(bytes: &[u8]) -> Result<Model, String> {
     if !surface::is_atlas_size(e.atlas_size) {
         return Err(format!("an atlas of {:?} texels", e.atlas_size));
     }
+    reader.refuse_addresses()?;
     reader.refuse_shared_images(&e)?;
     let method: Method = e.method.parse()?;
     let mesh = read_mesh(&reader, e.atlas_size)?;

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use turnlight::Selection;
 use turnlight::capture::Board;
 use turnlight::capture::board::{Dictionary, Paper, parse_length};
+use turnlight::export::web::AXES;
 use turnlight::texture::btf::{Budget, CodecKind, Precision};
 
 /// What this build can and cannot do.
@@ -84,6 +85,14 @@ pub(crate) enum ExportTarget {
     Obj,
 }
 
+/// How a page shows a model.
+#[derive(Debug, Args)]
+pub(crate) struct PageArgs {
+    /// Axis that points up in the page: x, y, z, -x, -y, -z [default: that of the turntable, else z]
+    #[arg(long, value_name = "AXIS", value_parser = AXES, allow_hyphen_values = true, hide_possible_values = true)]
+    pub(crate) up: Option<String>,
+}
+
 #[derive(Debug, Args)]
 pub(crate) struct ExportArgs {
     /// The model to export
@@ -91,6 +100,8 @@ pub(crate) struct ExportArgs {
     /// What to write
     #[arg(long, value_enum)]
     pub(crate) to: ExportTarget,
+    #[command(flatten)]
+    pub(crate) page: PageArgs,
     /// The folder to write
     #[arg(short, long, value_name = "DIR")]
     pub(crate) output: PathBuf,
@@ -103,6 +114,8 @@ pub(crate) struct ViewArgs {
     /// Show it in a browser: serve it to this machine alone, and print the address
     #[arg(long, required = true)]
     pub(crate) web: bool,
+    #[command(flatten)]
+    pub(crate) page: PageArgs,
     /// Port to serve on; 0 takes any free one
     #[arg(long, value_name = "N", default_value = "0")]
     pub(crate) port: u16,

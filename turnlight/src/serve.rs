@@ -6,6 +6,7 @@
 
 use crate::Error;
 use crate::export::web::{Site, SiteFile};
+use render::web::PAGE;
 use std::io::{self, Read, Write};
 use std::net::{Ipv4Addr, SocketAddr, TcpListener, TcpStream};
 use std::sync::Arc;
@@ -135,7 +136,7 @@ fn parse(head: &[u8]) -> Option<(&str, &str, &str)> {
 /// The file of exactly this name; the page where none is named.
 fn find<'a>(target: &str, site: &'a Site) -> Option<&'a SiteFile> {
     let path = target.split('?').next()?.strip_prefix('/')?;
-    let path = if path.is_empty() { "index.html" } else { path };
+    let path = if path.is_empty() { PAGE } else { path };
     site.files.iter().find(|file| file.path == path)
 }
 

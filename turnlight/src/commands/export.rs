@@ -5,7 +5,7 @@ use crate::Answer;
 use crate::arguments::{ExportArgs, ExportTarget};
 use serde_json::json;
 use turnlight::Error;
-use turnlight::export::{obj, web::Site};
+use turnlight::export::obj;
 use turnlight::output::OutputFolder;
 use turnlight::texture::Model;
 
@@ -15,7 +15,7 @@ pub(crate) fn run(args: &ExportArgs) -> Result<Answer, Error> {
     let folder = OutputFolder::create(&args.output)?;
     let hint = match args.to {
         ExportTarget::Web => {
-            Site::new(bytes).write(&folder)?;
+            args.page.site(bytes).write(&folder)?;
             "serve it with any static web server; index.html is the page"
         }
         ExportTarget::Obj => {

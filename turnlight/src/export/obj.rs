@@ -10,8 +10,8 @@ const MESH: &str = "model.obj";
 const MATERIAL: &str = "model.mtl";
 const PICTURE: &str = "model.png";
 
-/// Writes `model.obj`, `model.mtl` and `model.png` below `folder`. The material is unlit (it only emits, where a program
-/// knows emission): the picture holds the light it was taken in.
+/// Writes `model.obj`, `model.mtl` and `model.png` below `folder`. The material asks for colour without
+/// lighting (`illum 0`): the picture holds the light it was taken in.
 ///
 /// # Errors
 /// Names the file and what the system said.
