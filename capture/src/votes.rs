@@ -81,21 +81,7 @@ impl Votes {
     /// Cells with a free neighbour: the inner ones cannot change a silhouette.
     fn surface<'a>(&'a self, cells: &'a [bool]) -> impl Iterator<Item = usize> + 'a {
         let is_free = move |n: Option<usize>| n.is_none_or(|n| !cells[n]);
-        (0..cells.len()).filter(move |&i| cells[i] && self.neighbours(i).into_iter().any(is_free))
-    }
-
-    fn neighbours(&self, index: usize) -> [Option<usize>; 6] {
-        let [nx, ny, nz] = self.size;
-        let (x, y, z) = (index % nx, index / nx % ny, index / nx / ny);
-        let plane = nx * ny;
-        [
-            (x > 0).then(|| index - 1),
-            (x + 1 < nx).then(|| index + 1),
-            (y > 0).then(|| index - nx),
-            (y + 1 < ny).then(|| index + nx),
-            (z > 0).then(|| index - plane),
-            (z + 1 < nz).then(|| index + plane),
-        ]
+        (0..cells.len()).filter(move |&i| cells[i] && neighbours(self.size, i).into_iter().any(is_free))
     }
 
     fn largest_part(&self, cells: &[bool]) -> Vec<bool> {
@@ -113,7 +99,7 @@ impl Votes {
             open.push(start);
             while let Some(at) = open.pop() {
                 size += 1;
-                for next in self.neighbours(at).into_iter().flatten() {
+                for next in neighbours(self.size, at).into_iter().flatten() {
                     if cells[next] && label[next] == 0 {
                         label[next] = labels;
                         open.push(next);
@@ -124,6 +110,20 @@ impl Votes {
         }
         label.iter().map(|&l| l != 0 && l == best.1).collect()
     }
+}
+
+/// The cells of a grid (x fastest) that share a face with one.
+pub(crate) fn neighbours([nx, ny, nz]: [usize; 3], index: usize) -> [Option<usize>; 6] {
+    let (x, y, z) = (index % nx, index / nx % ny, index / nx / ny);
+    let plane = nx * ny;
+    [
+        (x > 0).then(|| index - 1),
+        (x + 1 < nx).then(|| index + 1),
+        (y > 0).then(|| index - nx),
+        (y + 1 < ny).then(|| index + nx),
+        (z > 0).then(|| index - plane),
+        (z + 1 < nz).then(|| index + plane),
+    ]
 }
 
 /// The matte where a point lands; `None` outside the frame or behind the camera.

@@ -41,6 +41,14 @@ pub struct DirectionComplex {
     inverses: Vec<Matrix3<f64>>,
 }
 
+/// Simplices among which some direction finds its own, each list ascending.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Candidates {
+    triangles: Vec<u32>,
+    sites: Vec<u32>,
+    edges: Vec<u32>,
+}
+
 /// A convex combination of up to three sites; unused entries have weight 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Blend {
@@ -219,8 +227,42 @@ impl DirectionComplex {
         };
         Some(match self.ring {
             Some(axis) => self.by_azimuth(&d, &axis),
-            None => self.inside(&d).unwrap_or_else(|| self.nearest(&d)),
+            None => {
+                let all = |count: usize| 0..count as u32;
+                let inside = self.inside(&d, all(self.triangles.len()));
+                inside.unwrap_or_else(|| self.nearest(&d, all(self.sites.len()), all(self.edges.len())))
+            }
         })
+    }
+
+    /// [`DirectionComplex::blend`] of a unit vector, of which `among` holds the simplex.
+    pub(crate) fn blend_among(&self, unit: &Vector3<f64>, among: &Candidates) -> Option<Blend> {
+        if self.ring.is_some() || self.sites.is_empty() {
+            return self.blend(unit);
+        }
+        let inside = self.inside(unit, among.triangles.iter().copied());
+        let nearest = || self.nearest(unit, among.sites.iter().copied(), among.edges.iter().copied());
+        Some(inside.unwrap_or_else(nearest))
+    }
+
+    /// At least the simplices that some direction within `radius` of unit `centre` finds.
+    pub(crate) fn candidates(&self, centre: &Vector3<f64>, radius: f64) -> Candidates {
+        let meets =
+            |inverse: &Matrix3<f64>| inverse.row_iter().all(|row| (row * centre).x >= -row.norm() * radius - 1e-9);
+        let of_site = |s: &Vector3<f64>| angle(s, centre);
+        let of_edge = |&[i, j]: &[u32; 2]| {
+            let (a, b) = (self.sites[i as usize], self.sites[j as usize]);
+            let foot = project_to_arc(centre, &a, &b).map_or(PI, |(cosine, _)| cosine.clamp(-1.0, 1.0).acos());
+            foot.min(of_site(&a)).min(of_site(&b))
+        };
+        let sites: Vec<f64> = self.sites.iter().map(of_site).collect();
+        let edges: Vec<f64> = self.edges.iter().map(of_edge).collect();
+        let reach = sites.iter().chain(&edges).copied().fold(PI, f64::min) + 2.0 * radius;
+        Candidates {
+            triangles: positions(&self.inverses, meets),
+            sites: positions(&sites, |&distance| distance <= reach),
+            edges: positions(&edges, |&distance| distance <= reach),
+        }
     }
 
     /// The edge that spans the azimuth of `d` about `axis`; the site nearest in azimuth where none does.
@@ -239,9 +281,9 @@ impl DirectionComplex {
     }
 
     /// Barycentric weights in the triangle around `d`.
-    fn inside(&self, d: &Vector3<f64>) -> Option<Blend> {
-        self.triangles.iter().zip(&self.inverses).find_map(|(t, inverse)| {
-            let w = inverse * d;
+    fn inside(&self, d: &Vector3<f64>, mut among: impl Iterator<Item = u32>) -> Option<Blend> {
+        among.find_map(|i| {
+            let (t, w) = (self.triangles[i as usize], self.inverses[i as usize] * d);
             let sum = w.sum();
             if w.min() < -1e-12 || sum <= 1e-12 {
                 return None;
@@ -253,14 +295,15 @@ impl DirectionComplex {
     }
 
     /// The nearest point of the edges, and of the sites that no simplex holds.
-    fn nearest(&self, d: &Vector3<f64>) -> Blend {
+    fn nearest(&self, d: &Vector3<f64>, sites: impl Iterator<Item = u32>, edges: impl Iterator<Item = u32>) -> Blend {
         let mut best = (f64::NEG_INFINITY, Blend::site(0));
-        for (i, s) in self.sites.iter().enumerate() {
-            if s.dot(d) > best.0 {
-                best = (s.dot(d), Blend::site(i as u32));
+        for i in sites {
+            let cosine = self.sites[i as usize].dot(d);
+            if cosine > best.0 {
+                best = (cosine, Blend::site(i));
             }
         }
-        for &[i, j] in &self.edges {
+        for [i, j] in edges.map(|edge| self.edges[edge as usize]) {
             let (a, b) = (self.sites[i as usize], self.sites[j as usize]);
             let Some((cosine, t)) = project_to_arc(d, &a, &b) else { continue };
             if cosine > best.0 {
@@ -275,6 +318,11 @@ impl Blend {
     fn site(site: u32) -> Self {
         Self { entries: [(site, 1.0), (0, 0.0), (0, 0.0)] }
     }
+}
+
+/// Positions of what satisfies a condition, ascending.
+fn positions<T>(items: &[T], holds: impl Fn(&T) -> bool) -> Vec<u32> {
+    (0u32..).zip(items).filter(|(_, item)| holds(item)).map(|(i, _)| i).collect()
 }
 
 /// Foot of the perpendicular from `d` on the great arc from `a` to `b`: its cosine to `d` and its

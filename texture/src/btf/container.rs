@@ -21,7 +21,7 @@
 //! what they hold.
 
 use super::{Codec, CodecKind, DirectionSet, Frame, Material};
-use capture::btf::{Encoding, bonn_directions};
+use capture::btf::{Btf, Encoding, bonn_directions};
 use nalgebra::Vector3;
 use std::fmt;
 use std::sync::Arc;
@@ -137,6 +137,12 @@ impl Writer {
             self.bytes.push(self.pending.0 as u8);
             self.pending = (self.pending.0 >> 8, self.pending.1 - 8);
         }
+    }
+
+    /// All that was written.
+    pub fn into_bytes(mut self) -> Vec<u8> {
+        self.align();
+        self.bytes
     }
 
     /// Fills the last byte of a run of bits with zeros.
@@ -322,6 +328,14 @@ impl Material {
     }
 }
 
+/// Bytes of a file before the codec's own parts.
+pub(super) fn header_bytes(btf: &Btf) -> usize {
+    let mut out = Writer::default();
+    [&btf.views, &btf.lights].into_iter().for_each(|list| write_directions(list, &mut out));
+    let range = if matches!(btf.encoding, Encoding::Log { .. }) { 8 } else { 0 };
+    MAGIC.len() + 37 + btf.name.len().min(255) + range + out.bytes.len()
+}
+
 fn write_header(material: &Material, frame: &Frame, out: &mut Writer) {
     let name = material.name.get(..255).unwrap_or(&material.name).as_bytes();
     out.u8(name.len() as u8);
@@ -340,16 +354,16 @@ fn write_header(material: &Material, frame: &Frame, out: &mut Writer) {
     out.u64(material.raw_bytes);
     out.u16(frame.width as u16);
     out.u16(frame.height as u16);
-    write_directions(&frame.views, out);
-    write_directions(&frame.lights, out);
+    write_directions(frame.views.vectors(), out);
+    write_directions(frame.lights.vectors(), out);
 }
 
-fn write_directions(directions: &DirectionSet, out: &mut Writer) {
-    if directions.vectors() == bonn_directions() {
+fn write_directions(directions: &[Vector3<f64>], out: &mut Writer) {
+    if directions == bonn_directions() {
         return out.u16(0);
     }
     out.u16(directions.len() as u16);
-    directions.vectors().iter().for_each(|d| out.f32s(&[d.x as f32, d.y as f32]));
+    directions.iter().for_each(|d| out.f32s(&[d.x as f32, d.y as f32]));
 }
 
 /// All but the codec.

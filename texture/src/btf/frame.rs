@@ -1,5 +1,6 @@
 //! What every codec shares: the tile's size, and the directions it was measured under.
 
+use super::lookup::Lookup;
 use crate::directions::{DirectionComplex, Layout};
 use nalgebra::Vector3;
 use std::sync::Arc;
@@ -22,6 +23,7 @@ pub struct Frame {
 pub struct DirectionSet {
     vectors: Vec<Vector3<f64>>,
     complex: DirectionComplex,
+    lookup: Lookup,
 }
 
 /// A convex combination of up to three directions; unused entries have weight 0.
@@ -47,6 +49,16 @@ impl Frame {
         self.width * self.height
     }
 
+    /// The measured pairs about a light and a view, numbered view · lights + light, and their weights; unused
+    /// ones have weight 0.
+    pub fn blend(&self, light: &Vector3<f32>, view: &Vector3<f32>) -> [(usize, f32); 9] {
+        let (light, view) = (self.lights.blend(light), self.views.blend(view));
+        std::array::from_fn(|i| {
+            let ((v, a), (l, b)) = (view.entries[i / 3], light.entries[i % 3]);
+            (v as usize * self.lights.len() + l as usize, a * b)
+        })
+    }
+
     /// Pairs of view and light.
     pub fn pairs(&self) -> usize {
         self.views.len() * self.lights.len()
@@ -56,7 +68,8 @@ impl Frame {
 impl DirectionSet {
     /// A set of unit vectors.
     pub fn new(vectors: &[Vector3<f64>]) -> Self {
-        Self { vectors: vectors.to_vec(), complex: DirectionComplex::build(vectors, Layout::General) }
+        let complex = DirectionComplex::build(vectors, Layout::General);
+        Self { vectors: vectors.to_vec(), lookup: Lookup::new(&complex), complex }
     }
 
     /// Number of directions.
@@ -76,7 +89,7 @@ impl DirectionSet {
 
     /// The measured directions about a direction; beyond the outermost ring, the nearest point of the border.
     pub fn blend(&self, direction: &Vector3<f32>) -> Blend {
-        let blend = self.complex.blend(&direction.cast());
+        let blend = self.lookup.blend(&self.complex, &direction.cast());
         let entries = blend.map_or([(0, 1.0), (0, 0.0), (0, 0.0)], |b| b.entries.map(|(site, w)| (site, w as f32)));
         Blend { entries }
     }

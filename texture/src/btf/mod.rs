@@ -20,6 +20,7 @@
 //! To add a codec: a file with its page, `Options`, `fit`, [`Sampler`] or [`Synthesizer`], and
 //! [`Stored`](container::Stored); an entry in [`CodecKind`], [`Codec`] and `fit`; its decoder among the fuzz targets.
 
+mod budget;
 pub mod car2d;
 pub mod car3d;
 pub mod container;
@@ -27,12 +28,18 @@ mod frame;
 pub mod gaussian_mixture;
 pub mod gmrf;
 pub mod lafortune;
+mod linear;
 pub mod local_pca;
+mod lookup;
 pub mod multilevel_vq;
 pub mod pca;
 pub mod pca_view;
+mod principal;
 pub mod ptm;
+mod random_field;
+mod rows;
 mod score;
+pub mod statistics;
 
 pub use container::Part;
 pub use frame::{Blend, DirectionSet, Frame};

@@ -2,6 +2,7 @@
 //! silhouette is known to a fraction of a cell.
 
 use super::optics::Directions;
+use crate::votes::neighbours;
 use crate::{Aabb, Camera, Image};
 use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
@@ -203,7 +204,7 @@ impl Consensus {
             let mut size = 0;
             while let Some(at) = open.pop() {
                 size += 1;
-                for next in self.neighbours(at).into_iter().flatten() {
+                for next in neighbours(self.size, at).into_iter().flatten() {
                     if self.values[next] >= 128 && labels[next] == 0 {
                         labels[next] = label;
                         open.push(next);
@@ -219,20 +220,6 @@ impl Consensus {
                 *value = 0;
             }
         }
-    }
-
-    fn neighbours(&self, index: usize) -> [Option<usize>; 6] {
-        let [nx, ny, nz] = self.size;
-        let [x, y, z] = self.place(index);
-        let plane = nx * ny;
-        [
-            (x > 0).then(|| index - 1),
-            (x + 1 < nx).then(|| index + 1),
-            (y > 0).then(|| index - nx),
-            (y + 1 < ny).then(|| index + nx),
-            (z > 0).then(|| index - plane),
-            (z + 1 < nz).then(|| index + plane),
-        ]
     }
 }
 

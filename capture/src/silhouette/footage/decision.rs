@@ -1,6 +1,9 @@
-//! From odds to a silhouette: near the hull of all views the odds decide, far from it the hull does.
+//! From odds to a silhouette: near the hull of all views the odds decide, far from it the hull does, and of all borders
+//! the shortest along edges of the picture is taken.
 
 use super::Odds;
+use super::cut::Cut;
+use super::light::Toned;
 use crate::Image;
 use crate::matte::{components, signed_distance};
 
@@ -8,26 +11,55 @@ use crate::matte::{components, signed_distance};
 const TRUST: f32 = 9.0;
 
 /// Log odds gained per pixel inside the hull.
-const SLOPE: f32 = 0.5;
+const SLOPE: f32 = 0.35;
+
+/// Log odds that a pixel of border costs where the picture is even.
+const BORDER: f32 = 7.5;
 
 /// A hole of which more than this share is object for the other views is a patch of the background's colour.
 const LARGEST_SOLID: f64 = 0.7;
 
 /// Object (255) or not, for voting where no hull is known yet: in between where the odds are even.
-pub(super) fn guessed(odds: &Odds) -> Image<u8> {
-    odds.log_odds.map(|l| (255.0 / (1.0 + (-0.7 * l).exp())) as u8)
+pub(super) fn guessed(log_odds: &Image<f32>) -> Image<u8> {
+    log_odds.map(|l| (255.0 / (1.0 + (-0.7 * l).exp())) as u8)
 }
 
-/// The silhouette (255 or 0). `hull` is that of all views, object from 128 on; each pixel outside it costs `distrust`
-/// of the log odds. With `fills_holes` the hull is good enough to say which holes are patches of the background's colour.
-pub(super) fn decided(odds: &Odds, hull: &Image<u8>, distrust: f32, fills_holes: bool) -> Image<u8> {
+/// The silhouette (255 or 0): the cheapest border (Boykov and Jolly, Interactive Graph Cuts, ICCV 2001) given the odds,
+/// the hull of all views (object from 128 on), of which each pixel outside costs `distrust` of the log odds, and a price
+/// per pixel of border, lower along edges of the picture. With `fills_holes` the hull is good enough to say which holes
+/// are patches of the background's colour.
+pub(super) fn decided(picture: &Toned, odds: &Odds, hull: &Image<u8>, distrust: f32, fills_holes: bool) -> Image<u8> {
     let distance = signed_distance(hull);
-    let object = odds.log_odds.pixels().iter().zip(distance.pixels()).map(|(&l, &d)| {
+    let gain = odds.log_odds.pixels().iter().zip(distance.pixels()).map(|(&l, &d)| {
         let prior = if d > 0.0 { (SLOPE * d).min(TRUST) } else { distrust * d };
-        l + prior > 0.0
+        cost(l + prior)
     });
-    let mask = Image::from_pixels(hull.width(), hull.height(), object.collect()).unwrap_or_default();
+    let gain = Image::from_pixels(hull.width(), hull.height(), gain.collect()).unwrap_or_default();
+    let [right, down] = borders(picture, hull.width(), hull.height());
+    let mask = Cut::new(&gain, &right, &down).inside();
     without_specks(&mask, hull, if fills_holes { LARGEST_SOLID } else { 1.0 })
+}
+
+/// Log odds as whole numbers: flow in these ends, and is the same everywhere.
+fn cost(log_odds: f32) -> i32 {
+    // The distance to a hull of which nothing is seen is infinite.
+    (64.0 * log_odds.clamp(-1000.0, 1000.0)).round() as i32
+}
+
+/// The price of a border to the right of each pixel and below it: `p exp(−|ΔI|² / (2 ⟨|ΔI|²⟩))`, lowest where colours
+/// differ more than they do in the mean (Rother, Kolmogorov and Blake, GrabCut, SIGGRAPH 2004).
+fn borders(picture: &Toned, width: usize, height: usize) -> [Image<i32>; 2] {
+    let difference = |x: usize, y: usize, dx: usize, dy: usize| -> f32 {
+        let (a, b) = (picture.at(x, y), picture.at((x + dx).min(width - 1), (y + dy).min(height - 1)));
+        (0..3).map(|c| (a[c] - b[c]).powi(2)).sum()
+    };
+    let squares = [(1, 0), (0, 1)].map(|(dx, dy)| {
+        let pixels = (0..width * height).map(|at| difference(at % width, at / width, dx, dy));
+        Image::from_pixels(width, height, pixels.collect()).unwrap_or_default()
+    });
+    let sum: f64 = squares.iter().flat_map(|s| s.pixels()).map(|&s| f64::from(s)).sum();
+    let mean = (sum / (2 * width * height).max(1) as f64).max(1.0) as f32;
+    squares.map(|s| s.map(|d| cost(BORDER * (-0.5 * d / mean).exp())))
 }
 
 /// Drops parts below a hundredth of the largest, fills holes below a two-thousandth of the object and those that the

@@ -3,7 +3,8 @@
 //! 1. *Gains*: what looks the same in many frames evens out exposure and white balance.
 //! 2. *Plates*: the room behind, per pixel of a still camera, and the target plane, from above: the colour most
 //!    frames agree on. Light stays in the room while the target turns, so shade is smooth in each frame.
-//! 3. *Odds*: what the plates explain, in light or in shadow, is background; what has the object's colours is object.
+//! 3. *Odds*: what the plates explain, in light or in shadow, is background; what has the object's colours, or those it
+//!    has near by, is object. The cheapest border near the hull so far is the silhouette's.
 //! 4. *Hull*: the views vote; the hull decides where the odds do not, says which frames see a place of the plates
 //!    uncovered, which colours the object has, and which frame contradicts the others.
 //! 5. *Rim*: coverage at the edge from the colours on both sides of it.
@@ -13,10 +14,12 @@
 mod cloth;
 mod cluster;
 mod consensus;
+mod cut;
 mod decision;
 mod gains;
 mod judgement;
 mod light;
+mod nearby;
 mod odds;
 mod optics;
 mod palette;

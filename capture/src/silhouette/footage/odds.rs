@@ -8,10 +8,10 @@
 
 use super::cluster::Cluster;
 use super::light::Toned;
+use super::nearby::Nearby;
 use super::palette::Palettes;
 use super::shade::Shade;
 use crate::Image;
-use crate::matte::blur;
 
 /// Noise of sensor and codec, encoded levels.
 const NOISE: f32 = 3.0;
@@ -19,8 +19,9 @@ const NOISE: f32 = 3.0;
 /// Of what is expected: light that is not quite as smooth as thought.
 const LIGHT_ERROR: f32 = 0.03;
 
-/// The least of what is left of the (encoded) light in shadow.
-const DEEPEST_SHADOW: f32 = 0.35;
+/// The least of what is left of the (encoded) light in shadow: where the light is not known yet, and beside what is
+/// known of it.
+const DEEPEST_SHADOW: [f32; 2] = [0.35, 0.7];
 
 /// Of the light that a shadow takes: what the object beside it throws back in its own colour.
 const SHADOW_TINT: f32 = 0.1;
@@ -50,8 +51,10 @@ pub(super) fn of(
     room: Option<&Image<Cluster>>,
     target: Option<(&Image<Cluster>, &Shade)>,
     palettes: &Palettes,
+    nearby: Option<&Nearby>,
     size: (usize, usize),
 ) -> Odds {
+    let deepest = DEEPEST_SHADOW[usize::from(nearby.is_some())];
     let (width, height) = size;
     let mut log_odds = Image::filled(width, height, 0.0);
     let mut background = Image::filled(width, height, None);
@@ -73,16 +76,20 @@ pub(super) fn of(
                 continue;
             };
             let colour = picture.at(x, y);
-            let odds = palettes.object.log_density(&colour) - log_density(&colour, &behind);
+            let object = match nearby {
+                Some(nearby) => nearby.log_density(&colour, x, y, &palettes.object),
+                None => palettes.object.log_density(&colour),
+            };
+            let odds = object - log_density(&colour, &behind, deepest);
             log_odds.set(x, y, odds.clamp(-LARGEST, LARGEST));
             background.set(x, y, Some(behind.colour));
         }
     }
-    Odds { log_odds: blur(&log_odds, 1.1), background }
+    Odds { log_odds, background }
 }
 
 /// Natural logarithm of the density of `colour` where `behind` is seen.
-fn log_density(colour: &[f32; 3], behind: &Cluster) -> f32 {
+fn log_density(colour: &[f32; 3], behind: &Cluster, deepest: f32) -> f32 {
     let b = behind.colour;
     let length = (b[0] * b[0] + b[1] * b[1] + b[2] * b[2]).sqrt();
     let sigma = (behind.spread.powi(2) + NOISE.powi(2) + (LIGHT_ERROR * length * 0.58).powi(2)).sqrt();
@@ -93,9 +100,9 @@ fn log_density(colour: &[f32; 3], behind: &Cluster) -> f32 {
     };
     let lit = 0.85_f32.ln() + gauss(squares(1.0), sigma, 3.0);
     let along = (0..3).map(|c| colour[c] * b[c]).sum::<f32>() / (length * length).max(1.0);
-    let factor = along.clamp(DEEPEST_SHADOW, 1.0);
+    let factor = along.clamp(deepest, 1.0);
     let shadow_sigma = sigma.hypot(SHADOW_TINT * (1.0 - factor) * length);
-    let shadow_length = ((1.0 - DEEPEST_SHADOW) * length).max(2.5 * sigma);
+    let shadow_length = ((1.0 - deepest) * length).max(2.5 * sigma);
     let in_shadow = gauss(squares(factor), shadow_sigma, 2.0) - shadow_length.ln();
     let anything = 0.02_f32.ln() - 3.0 * 256.0_f32.ln();
     lit.max(0.13_f32.ln() + in_shadow).max(anything)

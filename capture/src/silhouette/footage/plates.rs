@@ -26,6 +26,13 @@ const SURE: u8 = 6;
 /// Log odds by colour from which on a place beside the hull is the object, not the target.
 const SUSPICIOUS: f32 = 2.0;
 
+/// Of the (encoded) light on the print, what falls on parts of it in the mean of all frames.
+const PRINT_LIGHT: std::ops::RangeInclusive<f32> = 0.5..=1.15;
+
+/// Difference of hue from the print (encoded levels, and as a share of the brightest channel) that is light, too.
+const LEAST_TINT: f32 = 5.0;
+const LARGEST_TINT: f32 = 0.05;
+
 /// A frame that makes plates.
 #[derive(Debug)]
 pub(super) struct PlateFrame {
@@ -131,8 +138,8 @@ impl TargetPlate {
         Some(plate)
     }
 
-    /// Puts what is printed where too few frames agree on what they see: places that the object nearly always covers are
-    /// known all the same. Ink and paper look as they do where they are seen.
+    /// Puts what is printed where too few frames agree on what they see, or on something else: places that the object
+    /// nearly always covers are known all the same, and its foot is not taken for the print beside it. Ink and paper look as they do where they are seen.
     fn complete(&mut self, print: &Print) {
         let width = self.texture.width();
         let place = |at: usize| [at % width, at / width].map(|v| v as f64 + 0.5);
@@ -159,7 +166,7 @@ impl TargetPlate {
             let Some(dark) = *dark else { continue };
             let colour = [0, 1, 2].map(|c| paper.colour[c] + (ink.colour[c] - paper.colour[c]) * dark);
             let is_seen = texel.support >= SURE && !texel.is_covered();
-            if !is_seen {
+            if !is_seen || !is_like_print(&texel.colour, &colour) {
                 *texel = Cluster { colour, spread: paper.spread.max(ink.spread), support: SURE };
             }
         }
@@ -248,6 +255,15 @@ impl TargetPlate {
         let pixels = (0..width * height).into_par_iter().map_init(Vec::new, texel).collect();
         Image::from_pixels(width, height, pixels).unwrap_or_default()
     }
+}
+
+/// Whether a colour is that of the print in some light.
+pub(super) fn is_like_print(colour: &[f32; 3], print: &[f32; 3]) -> bool {
+    let dot = |b: &[f32; 3]| (0..3).map(|c| b[c] * print[c]).sum::<f32>();
+    let light = dot(colour) / dot(print).max(1.0);
+    let brightest = print[0].max(print[1]).max(print[2]);
+    let is_same_hue = (0..3).all(|c| (colour[c] - light * print[c]).abs() < LEAST_TINT + LARGEST_TINT * brightest);
+    is_same_hue && PRINT_LIGHT.contains(&light)
 }
 
 fn median(mut values: Vec<f32>) -> Option<f32> {

@@ -4,12 +4,13 @@ use super::cloth::Cloth;
 use super::cluster::{self, Cluster};
 use super::consensus::{Consensus, Dissent};
 use super::light::Toned;
+use super::nearby::Nearby;
 use super::optics::Cutout;
 use super::palette::{Palette, Palettes};
 use super::plates::{self, PlateFrame, TargetPlate};
 use super::shade::Shade;
 use super::{FetchFrame, SilhouetteOptions, StageSetup, decision, judgement, odds, rim};
-use crate::matte::{grow, signed_distance};
+use crate::matte::{blur, grow, signed_distance};
 use crate::{Aabb, Camera, CaptureError, Image};
 use rayon::prelude::*;
 
@@ -43,8 +44,9 @@ pub(super) struct Round {
     distrust: f32,
     /// Whether the hull has seen through every hole by now: what it does not see through is a patch.
     fills_holes: bool,
-    /// Pixels around the hull that may be object as well.
-    hidden_px: f64,
+    /// Around the hull what may be object as well, as a share of the longer side of a frame: a plate made there would be
+    /// of the object's foot.
+    hidden: f64,
     /// Whether coverage at the edge is asked for.
     is_refined: bool,
 }
@@ -61,7 +63,7 @@ pub(super) const GUESS: Round = Round {
     is_guess: true,
     distrust: 0.0,
     fills_holes: false,
-    hidden_px: 2.0,
+    hidden: 2.0 / 320.0,
     is_refined: false,
 };
 /// On thumbnails, with a hull.
@@ -71,7 +73,7 @@ pub(super) const COARSE: Round = Round {
     is_guess: false,
     distrust: 0.5,
     fills_holes: false,
-    hidden_px: 2.5,
+    hidden: 2.5 / 320.0,
     is_refined: false,
 };
 /// At full size.
@@ -81,7 +83,7 @@ pub(super) const FINE: Round = Round {
     is_guess: false,
     distrust: 0.5,
     fills_holes: false,
-    hidden_px: 2.5,
+    hidden: 2.5 / 320.0,
     is_refined: true,
 };
 /// At full size, for good.
@@ -89,9 +91,9 @@ pub(super) const LAST: Round = Round {
     resolution: 160,
     dissent: up_to(0.04),
     is_guess: false,
-    distrust: 2.0,
+    distrust: 0.5,
     fills_holes: true,
-    hidden_px: 2.5,
+    hidden: 1.25 / 320.0,
     is_refined: true,
 };
 
@@ -208,8 +210,8 @@ impl Scene<'_> {
     ) -> Result<PlateFrame, CaptureError> {
         let image = (self.fetch)(i)?;
         let camera = self.setup.cameras[i];
-        let hidden =
-            hull.map(|h| cutout.back(&grow(&h.silhouette(&cutout.camera(&camera)), round.hidden_px), &camera, 0));
+        let margin = round.hidden * longest_side(&camera) as f64;
+        let hidden = hull.map(|h| cutout.back(&grow(&h.silhouette(&cutout.camera(&camera)), margin), &camera, 0));
         let picture = Toned::new(image, &self.gains[i]);
         Ok(PlateFrame { picture, camera, segment: self.setup.segments[i], hidden })
     }
@@ -226,27 +228,36 @@ impl Scene<'_> {
         let camera = cutout.camera(&self.setup.cameras[i]);
         let picture = Toned::new(cutout.of(image), &self.gains[i]);
         let hull = belief.hull.as_ref().map(|h| h.silhouette(&camera));
-        let whole = self.setup.cameras[i].intrinsics;
-        let longest = whole.width.max(whole.height);
+        let longest = longest_side(&self.setup.cameras[i]);
         let target = plates.target.as_ref().map(|t| {
             let seen = t.predicted(&camera);
-            let hidden = hull.as_ref().map(|h| grow(h, round.hidden_px));
+            let hidden = hull.as_ref().map(|h| grow(h, round.hidden * longest as f64));
             let shade = Shade::of(&picture, &seen, hidden.as_ref(), longest);
             (seen, shade)
         });
         let room = self.setup.segments[i].and_then(|s| plates.rooms[s].as_ref()).map(|r| cutout.of(r));
         let target = target.as_ref().map(|(seen, shade)| (seen, shade));
-        let odds = odds::of(&picture, room.as_ref(), target, &belief.palettes, (cutout.width, cutout.height));
-        let Some(hull) = hull.filter(|_| !round.is_guess) else {
-            let matte = decision::guessed(&odds);
-            let colours = colours(&picture, &odds.log_odds, &matte);
+        let hull = hull.filter(|_| !round.is_guess);
+        let nearby = hull.as_ref().map(|h| Nearby::of(&picture, h, longest));
+        let size = (cutout.width, cutout.height);
+        let odds = odds::of(&picture, room.as_ref(), target, &belief.palettes, nearby.as_ref(), size);
+        // Without the noise of single pixels.
+        let even = blur(&odds.log_odds, 1.1);
+        let Some(hull) = hull else {
+            let matte = decision::guessed(&even);
+            let colours = colours(&picture, &even, &matte);
             return Part { cutout, camera, matte, unseparated: 0.0, colours };
         };
-        let mask = decision::decided(&odds, &hull, round.distrust, round.fills_holes);
+        let mask = decision::decided(&picture, &odds, &hull, round.distrust, round.fills_holes);
         let matte = if round.is_refined { rim::refined(&picture, &odds.background, &mask) } else { mask };
-        let colours = colours(&picture, &odds.log_odds, &matte);
-        Part { cutout, camera, matte, unseparated: unseparated(&odds.log_odds, &hull), colours }
+        let colours = colours(&picture, &even, &matte);
+        Part { cutout, camera, matte, unseparated: unseparated(&even, &hull), colours }
     }
+}
+
+/// Of a frame, in pixels.
+fn longest_side(camera: &Camera) -> usize {
+    camera.intrinsics.width.max(camera.intrinsics.height)
 }
 
 /// Of pixels that are object, and background, by themselves and not at its edge.

@@ -309,3 +309,93 @@ fn linear_light_and_levels_are_inverse() {
         assert!((encoded(linear(level)) - level).abs() < 1e-3);
     }
 }
+
+/// Numbers that differ, the same every time.
+fn scattered(seed: u64, count: usize, range: std::ops::Range<i32>) -> Vec<i32> {
+    let mut state = seed;
+    let mut next = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        range.start + ((state >> 33) % (range.end - range.start) as u64) as i32
+    };
+    (0..count).map(|_| next()).collect()
+}
+
+#[test]
+fn the_cut_is_the_cheapest_of_all() {
+    for seed in 0..60 {
+        let (width, height) = [(1, 1), (4, 3), (3, 4), (5, 2)][seed as usize % 4];
+        let count = width * height;
+        let image = |seed, range| Image::from_pixels(width, height, scattered(seed, count, range)).unwrap();
+        let inside = image(seed, -9..10);
+        let [right, down] = [image(seed + 100, 0..8), image(seed + 200, 0..8)];
+        let cost = |labels: &dyn Fn(usize) -> bool| -> i32 {
+            let at = |at: usize| {
+                let gain = inside.pixels()[at];
+                let alone = if labels(at) { (-gain).max(0) } else { gain.max(0) };
+                let is_border = |next: usize| labels(at) != labels(next);
+                let to_right = !(at + 1).is_multiple_of(width) && is_border(at + 1);
+                let to_below = at + width < count && is_border(at + width);
+                alone + i32::from(to_right) * right.pixels()[at] + i32::from(to_below) * down.pixels()[at]
+            };
+            (0..count).map(at).sum()
+        };
+        let least = (0..1_u32 << count).map(|bits| cost(&|at| bits >> at & 1 == 1)).min().unwrap();
+        let found = cut::Cut::new(&inside, &right, &down).inside();
+        assert_eq!(cost(&|at| found.pixels()[at]), least, "seed {seed}");
+    }
+}
+
+#[test]
+fn a_cut_of_nothing_is_nothing() {
+    let none = Image::filled(0, 0, 0);
+    assert!(cut::Cut::new(&none, &none, &none).inside().pixels().is_empty());
+}
+
+/// A border between an object of many colours and cloth: single pixels say next to nothing, together they do.
+#[test]
+fn noise_of_the_object_does_not_fray_its_edge() {
+    let cloth = [40, 120, 50];
+    let mut picture = Image::filled(40, 40, cloth);
+    let levels = scattered(3, 40 * 40, 5..200);
+    let mut mask = Image::filled(40, 40, 0);
+    for y in 0..40 {
+        for x in 0..20 {
+            let level = levels[y * 40 + x] as u8;
+            picture.set(x, y, [level, level, level / 2 + 40]);
+            mask.set(x, y, 255);
+        }
+    }
+    let behind = Image::filled(40, 40, Some(cloth.map(f32::from)));
+    let matte = rim::refined(&light::Toned::new(picture, &[1.0; 3]), &behind, &mask);
+    for y in 5..35 {
+        let edge: f32 = (10..30).map(|x| f32::from(matte.at(x, y)) / 255.0).sum();
+        // No pixel of the mask changes sides.
+        assert!((edge - 10.0).abs() < 0.5, "row {y}: {edge}");
+    }
+}
+
+#[test]
+fn a_foot_is_not_taken_for_the_print_beside_it() {
+    let (paper, ink) = ([210.0, 208.0, 200.0], [42.0, 42.0, 40.0]);
+    for (seen, print, is_print) in [
+        ([150.0, 148.0, 143.0], paper, true),
+        ([40.0, 41.0, 40.0], ink, true),
+        ([70.0, 62.0, 55.0], paper, false),
+        ([70.0, 62.0, 55.0], ink, false),
+        ([180.0, 60.0, 50.0], paper, false),
+    ] {
+        assert_eq!(plates::is_like_print(&seen, &print), is_print, "{seen:?} on {print:?}");
+    }
+}
+
+#[test]
+fn what_the_object_shows_near_by_is_likelier_there() {
+    let mut picture = Image::filled(160, 80, [200, 40, 30]);
+    (0..80).for_each(|y| (80..160).for_each(|x| picture.set(x, y, [45, 42, 40])));
+    let everywhere = Image::filled(160, 80, 255);
+    let near = nearby::Nearby::of(&light::Toned::new(picture, &[1.0; 3]), &everywhere, 160);
+    let all = palette::Palette::anything();
+    let at = |x: usize| near.log_density(&[46.0, 40.0, 41.0], x, 40, &all);
+    assert!(at(140) > all.log_density(&[46.0, 40.0, 41.0]) + 3.0, "{}", at(140));
+    assert!(at(20) < at(140) - 5.0, "{} {}", at(20), at(140));
+}
