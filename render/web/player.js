@@ -33,6 +33,7 @@ const FIELD_OF_VIEW_DEG = 30;
 const TURN_SECONDS = 12;
 /** Sine of an elevation that does not tell above from below. */
 const LEVEL = 0.1;
+const MOST_SUPERSAMPLE = 8;
 /** Radians that an arrow key turns by. */
 const STEP = Math.PI / 36;
 const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
@@ -240,7 +241,8 @@ class Player {
     this.takeControls();
     this.exact = null;
     this.isStale = true;
-    this.side = Number(query.get('supersample')) || (devicePixelRatio > 1.5 ? 1 : 2);
+    const asked = Math.round(Number(query.get('supersample')));
+    this.side = Math.min(Math.max(asked, 0), MOST_SUPERSAMPLE) || (devicePixelRatio > 1.5 ? 1 : 2);
     this.times = [];
     this.slow = 0;
     this.listen();
@@ -534,7 +536,15 @@ async function load(player) {
   if (head === null || arrival.at !== head.length) throw cutOff();
   await (shown ?? show(arrival, arrival.at));
   $('loading').hidden = true;
-  if (query.has('camera')) player.setCamera(JSON.parse(query.get('camera')));
+  if (query.has('camera')) lookThrough(player, query.get('camera'));
+}
+
+function lookThrough(player, text) {
+  try {
+    player.setCamera(JSON.parse(text));
+  } catch (fault) {
+    refuse(`The camera in the address is not understood: ${fault.message}.`);
+  }
 }
 
 const ready = start();

@@ -17,7 +17,7 @@ use turnlight::playback;
 use turnlight::serve::Server;
 use turnlight::stages::{Silent, Stages};
 
-/// Views that the pictures are compared at, of [`VIEWS`]: one that was seen, one turned away from all that were.
+/// Views that were filmed, and those of them near which pictures are compared.
 const VIEWS: usize = 12;
 const COMPARED: [usize; 2] = [1, 7];
 
