@@ -308,6 +308,14 @@ fn side_bytes(texels: usize, clusters: usize) -> usize {
 }
 
 impl LocalPca {
+    /// Bytes as the literature counts them, in 32-bit floats.
+    pub fn printed_bytes(&self) -> usize {
+        let components = self.components();
+        let shared: usize = components.iter().map(|&k| printed_bytes(0, self.frame.pairs(), 1, k, 4)).sum();
+        let own = self.places.iter().map(|place| components[usize::from(place.cluster)]);
+        shared + own.map(|k| printed_bytes(1, 0, 0, k, 4)).sum::<usize>()
+    }
+
     /// Number of components of each cluster.
     pub fn components(&self) -> Vec<usize> {
         self.models.iter().map(LinearModel::components).collect()

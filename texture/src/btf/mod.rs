@@ -252,6 +252,24 @@ impl Codec {
         }
     }
 
+    /// Bytes as the papers that compare these codecs count them, headers and often more left out; where they say.
+    pub fn bytes_as_printed(&self) -> Option<u64> {
+        let frame = self.frame();
+        let (texels, pairs) = (frame.texels(), frame.pairs());
+        let (views, lights) = (frame.views.len(), frame.lights.len());
+        let bytes = match self {
+            Self::Pca(c) => pca::printed_bytes(texels, pairs, c.components()),
+            Self::PcaView(c) => c.components().iter().map(|&k| pca_view::printed_bytes(texels, lights, k, 1)).sum(),
+            Self::LocalPca(c) => c.printed_bytes(),
+            Self::Ptm(_) => views * texels * ptm::printed_bytes(),
+            Self::Lafortune(_) => views * lafortune::printed_bytes(texels, lights),
+            Self::GaussianMixture(c) => gaussian_mixture::printed_bytes(c.components(), pairs),
+            // These are counted in print as we count them, or are not described well enough.
+            Self::MultilevelVq(_) | Self::Gmrf(_) | Self::Car2d(_) | Self::Car3d(_) => return None,
+        };
+        Some(bytes as u64)
+    }
+
     /// How this codec answers.
     pub fn answer(&self) -> Answer<'_> {
         match self {

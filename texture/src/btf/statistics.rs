@@ -45,6 +45,22 @@ pub struct TextureStatistics {
     pub spectrum_db: f64,
 }
 
+impl TextureStatistics {
+    /// The mean of each figure; of none, that of equal textures.
+    pub fn mean(all: &[Self]) -> Self {
+        let count = all.len().max(1) as f64;
+        let mean = |of: fn(&Self) -> f64| all.iter().map(of).sum::<f64>() / count;
+        Self {
+            mean_difference: mean(|s| s.mean_difference),
+            deviation_ratio: if all.is_empty() { 1.0 } else { mean(|s| s.deviation_ratio) },
+            earth_mover: mean(|s| s.earth_mover),
+            autocorrelation: mean(|s| s.autocorrelation),
+            band_db: std::array::from_fn(|octave| all.iter().map(|s| s.band_db[octave]).sum::<f64>() / count),
+            spectrum_db: mean(|s| s.spectrum_db),
+        }
+    }
+}
+
 /// Compares pictures of `[width, height]` texels, (y, x, channel), nominally 0 to 1. An empty one compares as black.
 pub fn compare(
     original: &[f32],

@@ -5,7 +5,11 @@ use crate::Error;
 use crate::stages::peak_bytes;
 use capture::btf::Btf;
 use serde::Serialize;
-use texture::btf::{Answer, Material, Part, Score, Synthesized, score, to_coded_range};
+use texture::btf::statistics::{TextureStatistics, compare};
+use texture::btf::{Answer, Material, Part, Sampler, Score, Synthesized, score, to_coded_range};
+
+/// Pictures whose statistics are compared.
+const JUDGED: usize = 64;
 
 /// What is known of a coded material.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -23,6 +27,8 @@ pub struct Evaluation {
     /// Sample by sample.
     #[serde(flatten)]
     pub score: Score,
+    /// Of codecs that keep the statistics alone: the mean over 64 pictures.
+    pub statistics: Option<TextureStatistics>,
     /// Answers per second; of codecs that are asked sample by sample.
     #[serde(flatten)]
     pub speed: Option<Speed>,
@@ -61,10 +67,11 @@ fn as_coded(material: &Material, btf: Btf) -> Btf {
 pub(super) fn judge(material: &Material, btf: &Btf, seed: u64) -> Evaluation {
     let (bytes, parts) = material.to_bytes();
     let ratio = |bytes: u64| material.raw_bytes as f64 / bytes as f64;
-    let (score, speed) = match material.codec.answer() {
-        Answer::Sampler(sampler) => (score(btf, sampler), Some(speed(sampler, seed))),
+    let (score, statistics, speed) = match material.codec.answer() {
+        Answer::Sampler(sampler) => (score(btf, sampler), None, Some(speed(sampler, seed))),
         Answer::Synthesizer(synthesizer) => {
-            (score(btf, &Synthesized::new(synthesizer, [btf.width, btf.height], seed)), None)
+            let drawn = Synthesized::new(synthesizer, [btf.width, btf.height], seed);
+            (score(btf, &drawn), Some(statistics(btf, &drawn)), None)
         }
     };
     Evaluation {
@@ -72,10 +79,23 @@ pub(super) fn judge(material: &Material, btf: &Btf, seed: u64) -> Evaluation {
         bytes: bytes.len() as u64,
         parts,
         ratio: ratio(bytes.len() as u64),
-        ratio_as_printed: None,
+        ratio_as_printed: material.codec.bytes_as_printed().map(ratio),
         score,
+        statistics,
         speed,
         fit_s: None,
         peak_bytes: peak_bytes(),
     }
+}
+
+/// How alike pictures are that need not agree texel by texel, over pairs spread evenly.
+fn statistics(btf: &Btf, drawn: &Synthesized<'_>) -> TextureStatistics {
+    let (lights, size) = (btf.lights.len(), [btf.width, btf.height]);
+    let of = |i: usize| {
+        let pair = i * btf.pairs() / JUDGED.min(btf.pairs());
+        let (view, light) = (pair / lights, pair % lights);
+        let picture = drawn.picture(&btf.lights[light].cast(), &btf.views[view].cast());
+        compare(btf.picture(view, light), size, &picture, size)
+    };
+    TextureStatistics::mean(&(0..JUDGED.min(btf.pairs())).map(of).collect::<Vec<_>>())
 }

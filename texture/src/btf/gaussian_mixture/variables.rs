@@ -1,0 +1,122 @@
+//! The nine variables of a sample: where, lit from where, seen from where, which colour.
+//!
+//! | | variable | unit |
+//! |---|---|---|
+//! | 0, 1 | x, y | texels, centres at half integers |
+//! | 2, 3 | α, s of the light | radians, sine |
+//! | 4, 5 | α, s of the eye | radians, sine |
+//! | 6–8 | colour less the mean picture's | encoded, 0 to 1 |
+//!
+//! Directions are cut like an onion: β between a direction and the plane x = 0, α about the x axis. Stored is
+//! s = sin β, for cells `Δα · Δs` are equal solid angles. The source's arccosines lose the sign of y, and exceed 1
+//! by rounding in one of three directions within the plane of x; arctangents do neither.
+
+use capture::btf::Btf;
+use nalgebra::Vector3;
+use std::borrow::Cow;
+
+/// Variables of a sample.
+pub(super) const VARIABLES: usize = 9;
+/// Those that are given when a colour is asked for.
+pub(super) const INPUTS: usize = 6;
+
+/// Smallest deviations: of an evenly lit texel, a sixth of the spacing of directions, half a step of 8 bits.
+/// Below, a component holds single columns of the grid and its likelihood has no bound.
+pub(super) const FLOORS: [f64; VARIABLES] = {
+    const COLOUR: f64 = 0.5 / 255.0;
+    const ANGLE: f64 = 0.0436;
+    [0.3, 0.3, ANGLE, ANGLE, ANGLE, ANGLE, COLOUR, COLOUR, COLOUR]
+};
+
+/// Samples on their grid: every texel under every pair of light and view.
+#[derive(Clone, Debug)]
+pub(super) struct Grid<'a> {
+    /// Per column, texels.
+    pub(super) x: Vec<f32>,
+    /// Per row, texels.
+    pub(super) y: Vec<f32>,
+    /// α and s of each light.
+    pub(super) lights: Vec<[f32; 2]>,
+    /// α and s of each view.
+    pub(super) views: Vec<[f32; 2]>,
+    /// The mean picture (view, light, channel) as stored: 255 stands for 1.
+    pub(super) mean: Vec<u8>,
+    /// (view, light, y, x, channel).
+    pub(super) samples: Cow<'a, [f32]>,
+}
+
+/// α and s = sin β of a unit vector; α is 0 where the direction is along the x axis and has none.
+pub(super) fn onion_slice(direction: &Vector3<f64>) -> [f64; 2] {
+    let across = direction.y.hypot(direction.z);
+    let alpha = if across < 1e-7 { 0.0 } else { direction.y.atan2(direction.z) };
+    [alpha, direction.x]
+}
+
+impl<'a> Grid<'a> {
+    /// The samples of a measurement, less nothing yet: [`Grid::residual`] subtracts the mean.
+    pub(super) fn of(btf: &'a Btf) -> Self {
+        let slices = |all: &[Vector3<f64>]| all.iter().map(|d| onion_slice(d).map(|v| v as f32)).collect();
+        Self {
+            x: centres(btf.width),
+            y: centres(btf.height),
+            lights: slices(&btf.lights),
+            views: slices(&btf.views),
+            mean: mean_picture(btf),
+            samples: Cow::Borrowed(&btf.samples),
+        }
+    }
+
+    /// Texels of the tile.
+    pub(super) fn texels(&self) -> usize {
+        self.x.len() * self.y.len()
+    }
+
+    /// View and light of a pair.
+    pub(super) fn view_and_light(&self, pair: usize) -> [usize; 2] {
+        [pair / self.lights.len(), pair % self.lights.len()]
+    }
+
+    /// α and s of light, then view, of a pair.
+    pub(super) fn angles(&self, pair: usize) -> [f32; 4] {
+        let [view, light] = self.view_and_light(pair);
+        let ([light_alpha, light_s], [view_alpha, view_s]) = (self.lights[light], self.views[view]);
+        [light_alpha, light_s, view_alpha, view_s]
+    }
+
+    /// The picture of a pair, (y, x, channel).
+    pub(super) fn picture(&self, pair: usize) -> &[f32] {
+        &self.samples[pair * 3 * self.texels()..][..3 * self.texels()]
+    }
+
+    /// The mean colour of a pair.
+    pub(super) fn mean_colour(&self, pair: usize) -> [f32; 3] {
+        [0, 1, 2].map(|channel| f32::from(self.mean[3 * pair + channel]) / 255.0)
+    }
+
+    /// Colour less the mean, of a texel under a pair.
+    pub(super) fn residual(&self, pair: usize, texel: usize) -> [f32; 3] {
+        let (colour, mean) = (&self.picture(pair)[3 * texel..][..3], self.mean_colour(pair));
+        [0, 1, 2].map(|channel| colour[channel] - mean[channel])
+    }
+
+    /// All nine variables of a sample.
+    pub(super) fn sample(&self, pair: usize, texel: usize) -> [f64; VARIABLES] {
+        let ([la, ls, va, vs], [r, g, b]) = (self.angles(pair), self.residual(pair, texel));
+        let (x, y) = (self.x[texel % self.x.len()], self.y[texel / self.x.len()]);
+        [x, y, la, ls, va, vs, r, g, b].map(f64::from)
+    }
+}
+
+/// Of texels along a side.
+pub(super) fn centres(count: usize) -> Vec<f32> {
+    (0..count).map(|i| i as f32 + 0.5).collect()
+}
+
+/// The mean over the texels of each pair, (view, light, channel), in 8 bits.
+fn mean_picture(btf: &Btf) -> Vec<u8> {
+    let mean = |picture: &[f32]| {
+        let sum = |channel: usize| picture.iter().skip(channel).step_by(3).map(|&s| f64::from(s)).sum::<f64>();
+        [0, 1, 2].map(|channel| (255.0 * sum(channel) / btf.texels() as f64).round().clamp(0.0, 255.0) as u8)
+    };
+    btf.samples.chunks_exact(3 * btf.texels()).flat_map(mean).collect()
+}
