@@ -28,10 +28,16 @@ const SHARE: f64 = 0.99;
 /// Frames of which the median time is printed.
 const FRAMES: usize = 20;
 
-/// A model per method, and cameras.
-fn models() -> &'static (Vec<(Method, Vec<u8>)>, Vec<Camera>) {
-    static MODELS: OnceLock<(Vec<(Method, Vec<u8>)>, Vec<Camera>)> = OnceLock::new();
-    MODELS.get_or_init(|| {
+/// What is played, made once.
+struct Played {
+    /// A file per method.
+    models: Vec<(Method, Vec<u8>)>,
+    cameras: Vec<Camera>,
+}
+
+fn played() -> &'static Played {
+    static PLAYED: OnceLock<Played> = OnceLock::new();
+    PLAYED.get_or_init(|| {
         let options = SynthOptions {
             views: VIEWS,
             width: 160,
@@ -47,7 +53,10 @@ fn models() -> &'static (Vec<(Method, Vec<u8>)>, Vec<Camera>) {
             let (model, _) = pipeline::model(&views, None, method, &shape, &fit, &mut stages).expect("a model");
             (method, model.to_glb().expect("a file"))
         };
-        (Method::ALL.map(model).into(), views.iter().map(|view| moved(&view.camera)).collect())
+        Played {
+            models: Method::ALL.map(model).into(),
+            cameras: views.iter().map(|view| moved(&view.camera)).collect(),
+        }
     })
 }
 
@@ -144,7 +153,7 @@ fn the_page_shows_what_the_renderer_draws() {
         eprintln!("skipped: chromium or node is not installed (apt-get install chromium nodejs)");
         return;
     };
-    let (models, cameras) = models();
+    let Played { models, cameras } = played();
     let place = tempfile::tempdir().expect("a folder");
     let frames: Vec<Value> = COMPARED.iter().map(|&view| frame(&cameras[view])).collect();
     let case = |(method, bytes): &(Method, Vec<u8>)| {
@@ -257,7 +266,7 @@ fn the_page_refuses_hostile_models_and_fetches_nothing() {
         eprintln!("skipped: chromium or node is not installed (apt-get install chromium nodejs)");
         return;
     };
-    let (_, model) = models().0.iter().find(|(method, _)| *method == Method::DynTex).expect("a model");
+    let (_, model) = played().models.iter().find(|(method, _)| *method == Method::DynTex).expect("a model");
     let mut files = vec![
         ("cut in half", "cut off", model[..model.len() / 2].to_vec()),
         ("a byte short", "cut off", model[..model.len() - 1].to_vec()),
@@ -283,7 +292,7 @@ fn the_page_refuses_hostile_models_and_fetches_nothing() {
 #[test]
 fn models_are_exported_whole_or_not_at_all() {
     let place = tempfile::tempdir().expect("a folder");
-    let (_, model) = &models().0[0];
+    let (_, model) = &played().models[0];
     std::fs::write(place.path().join("good.glb"), model).expect("written");
     std::fs::write(place.path().join("bad.glb"), &model[..model.len() / 2]).expect("written");
     let export = |file: &str, to: &str, folder: &str| {
@@ -313,7 +322,7 @@ fn models_are_exported_whole_or_not_at_all() {
 #[test]
 fn view_prints_an_address_and_serves_there() {
     let place = tempfile::tempdir().expect("a folder");
-    std::fs::write(place.path().join("m.glb"), &models().0[0].1).expect("written");
+    std::fs::write(place.path().join("m.glb"), &played().models[0].1).expect("written");
     let mut command = Command::new(tests::command());
     let mut child = command
         .args(["view", "--web", "m.glb"])
