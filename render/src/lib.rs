@@ -10,7 +10,8 @@
 //! nearest surface (either side of a face, any depth above zero), looks up the texture with
 //! perspective-exact coordinates, and filters it trilinearly over the footprint of *one sub-sample*,
 //! the longer of the two derivatives deciding the mip level. A pixel's colour is the mean over the
-//! covered sub-samples, clamped and rounded once; its alpha is their share.
+//! covered sub-samples, clamped and rounded once; its alpha is their share. Charts that carry a
+//! [`material`] are lit instead of looked up: `render_lit` of either renderer.
 //!
 //! State: the lens enters exactly where a ray goes, but its local magnification is left out of the
 //! mip level; filtering is isotropic, so surfaces at grazing angles blur along the far direction;
@@ -21,6 +22,7 @@ mod error;
 mod face;
 pub mod film;
 pub mod filter;
+pub mod material;
 pub mod path;
 pub mod reference;
 mod resolve;

@@ -7,6 +7,7 @@
 
 use crate::face::{Corners, corners};
 use crate::filter::{MipChain, level_of_footprint, top_level};
+use crate::material::{Lit, Spot};
 use crate::resolve::{Accumulator, ideal_position};
 use crate::{RenderOptions, frame_size, is_usable};
 use bvh::aabb::{Aabb, Bounded};
@@ -27,6 +28,27 @@ pub fn render(
     camera: &Camera,
     options: &RenderOptions,
 ) -> Image<[u8; 4]> {
+    draw(mesh, atlas, None, camera, options)
+}
+
+/// The same with materials, which must have been laid over `mesh`.
+pub fn render_lit(
+    mesh: &TexturedMesh,
+    atlas: &Image<[f32; 3]>,
+    lit: &Lit<'_>,
+    camera: &Camera,
+    options: &RenderOptions,
+) -> Image<[u8; 4]> {
+    draw(mesh, atlas, Some(lit), camera, options)
+}
+
+fn draw(
+    mesh: &TexturedMesh,
+    atlas: &Image<[f32; 3]>,
+    lit: Option<&Lit<'_>>,
+    camera: &Camera,
+    options: &RenderOptions,
+) -> Image<[u8; 4]> {
     let (width, height) = frame_size(camera);
     let nothing = Accumulator::default().finish(1, options.background);
     let mut frame = Image::filled(width, height, nothing);
@@ -41,7 +63,7 @@ pub fn render(
             let mut sum = Accumulator::default();
             for (row, column) in (n * y..n * (y + 1)).flat_map(|r| (n * x..n * (x + 1)).map(move |c| (r, c))) {
                 let ray = ideal_position(camera, column, row, n).map(|p| PixelRay::new(camera, p, n));
-                if let Some(colour) = ray.and_then(|ray| scene.shade(&ray, &chain)) {
+                if let Some(colour) = ray.and_then(|ray| scene.shade(&ray, &chain, lit)) {
                     sum.add(colour);
                 }
             }
@@ -124,7 +146,7 @@ impl Scene {
     }
 
     /// The colour of the nearest face along the ray; the face of lower index where two coincide.
-    fn shade(&self, ray: &PixelRay, chain: &MipChain) -> Option<[f32; 3]> {
+    fn shade(&self, ray: &PixelRay, chain: &MipChain, lit: Option<&Lit<'_>>) -> Option<[f32; 3]> {
         let query = bvh::ray::Ray::new(ray.origin, ray.direction);
         let mut nearest: Option<(Hit, &Triangle)> = None;
         for triangle in self.hierarchy.as_ref()?.traverse(&query, &self.triangles) {
@@ -136,7 +158,7 @@ impl Scene {
             }
         }
         let (hit, triangle) = nearest?;
-        Some(lookup(ray, &hit, &triangle.corners, chain))
+        Some(lookup(ray, &hit, triangle, chain, lit))
     }
 }
 
@@ -162,8 +184,9 @@ fn intersect(ray: &PixelRay, corners: &[Point3<f64>; 3]) -> Option<Hit> {
     (depth > 0.0).then_some(Hit { depth, barycentric })
 }
 
-/// The texture at a hit, filtered over the footprint of a sub-sample.
-fn lookup(ray: &PixelRay, hit: &Hit, corners: &Corners, chain: &MipChain) -> [f32; 3] {
+/// The texture at a hit, filtered over the footprint of a sub-sample, or the material there.
+fn lookup(ray: &PixelRay, hit: &Hit, triangle: &Triangle, chain: &MipChain, lit: Option<&Lit<'_>>) -> [f32; 3] {
+    let corners = &triangle.corners;
     let size = Vector2::new(chain.level(0).width() as f64, chain.level(0).height() as f64);
     let texels = corners.uvs.map(|uv| uv.coords.component_mul(&size));
     let at = texels[0] * hit.barycentric[0] + texels[1] * hit.barycentric[1] + texels[2] * hit.barycentric[2];
@@ -171,6 +194,11 @@ fn lookup(ray: &PixelRay, hit: &Hit, corners: &Corners, chain: &MipChain) -> [f3
         .map(|change| texel_change(ray, hit, corners, &texels, &change).norm_squared())
         .into_iter()
         .fold(0.0, f64::max);
+    if let Some(lit) = lit.filter(|lit| lit.coats.cover(triangle.face)) {
+        let uv = at.component_div(&size).into();
+        let side = (footprint / (size.x * size.y)).sqrt();
+        return lit.colour(&Spot { face: triangle.face, uv, side }, &ray.origin);
+    }
     chain.sample(at.x as f32, at.y as f32, level_of_footprint(footprint as f32))
 }
 

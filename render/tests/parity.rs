@@ -2,11 +2,15 @@
 
 mod support;
 
+use capture::btf::{Encoding, bonn_directions};
 use capture::{Camera, Distortion, Image};
 use geometry::TexturedMesh;
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
+use render::material::{Coat, Coats, Light, Lighting, Lit};
 use render::{RenderOptions, cpu, reference};
+use std::sync::Arc;
 use support::{atlas, knot, look_at, sphere, surface, torus};
+use texture::btf::{DirectionSet, Frame, Sampler};
 
 /// What two pictures of the same thing may differ by.
 #[derive(Debug, Default)]
@@ -161,7 +165,7 @@ fn grid_aligned_edges_leave_no_holes() {
 fn a_film_of_a_knot() {
     let (mesh, atlas) = (knot(400, 20), atlas(1024, 1024));
     let aabb = mesh.mesh.aabb().unwrap();
-    let cameras = render::path::turntable_cameras(&aabb, None, 4, 320, 240, nalgebra::Vector3::z());
+    let cameras = render::path::turntable_cameras(&aabb, None, 4, 320, 240, Vector3::z());
     let mut player = cpu::Player::new(&mesh, at(2));
     let frames: Vec<_> = cameras.iter().map(|camera| player.render(&atlas, camera)).collect();
     for frame in &frames {
@@ -216,5 +220,51 @@ fn broken_input_does_not_panic() {
             }
         }
         reference::render(mesh, &atlas, camera, &at(1));
+    }
+}
+
+/// Waves over the tile, gloss about the mirror direction: depends on all that both renderers must agree on.
+struct Brocade(Frame);
+
+impl Sampler for Brocade {
+    fn frame(&self) -> &Frame {
+        &self.0
+    }
+
+    fn value(&self, texel: usize, light: &Vector3<f32>, view: &Vector3<f32>) -> [f32; 3] {
+        let (x, y) = ((texel % self.0.width) as f32, (texel / self.0.width) as f32);
+        let half = (light + view).normalize();
+        let gloss = 0.8 * half.z.powi(20) * (1.0 + half.x);
+        [0.3 + 0.2 * (x * 0.8).sin(), 0.3 + 0.2 * (y * 0.4).sin(), 0.2].map(|albedo| light.z * (albedo + gloss))
+    }
+}
+
+#[test]
+fn materials_are_lit_alike() {
+    let directions = Arc::new(DirectionSet::new(&bonn_directions()));
+    let brocade = Brocade(Frame { width: 16, height: 32, views: directions.clone(), lights: directions });
+    let atlas = atlas(512, 384);
+    let charts: Vec<u32> = (0..2000).step_by(2).collect();
+    for (name, mesh, tile_size) in
+        [("sphere", sphere(40, 20), 0.3), ("torus", torus(60, 24), 0.02), ("knot", knot(160, 12), 2.0)]
+    {
+        let (encoding, exposure) = (Encoding::Srgb, 0.7);
+        let coat = Coat { charts: &charts, tile_size, sampler: &brocade, encoding, exposure, includes_cosine: true };
+        let coats = Coats::new(&mesh, &[coat]);
+        let lights = vec![
+            Light::directional(Vector3::new(1.0, -0.5, 0.7)),
+            Light::point(Point3::new(1.5, 1.0, 0.4), &Point3::origin()),
+        ];
+        let lighting = Lighting { lights, stops: -0.5 };
+        let lit = Lit { coats: &coats, lighting: &lighting };
+        for (eye, n) in [([3.0, 0.4, 1.0], 2), ([0.3, -2.0, 2.0], 1), ([0.1, 0.2, 0.1], 1)] {
+            let camera = look_at(Point3::from(eye), Point3::origin(), 180.0, 201, 151);
+            let expected = reference::render_lit(&mesh, &atlas, &lit, &camera, &at(n));
+            let d = difference(&expected, &cpu::render_lit(&mesh, &atlas, &lit, &camera, &at(n)));
+            println!("{name}: {d:?}");
+            assert!(d.inner > 1000 && d.inner_off * 1000 <= d.inner && d.edge_off * 100 <= d.edge, "{name}: {d:?}");
+            let plain = difference(&expected, &cpu::render(&mesh, &atlas, &camera, &at(n)));
+            assert!(plain.inner_off * 4 > plain.inner, "{name}: the material does not show");
+        }
     }
 }

@@ -440,7 +440,8 @@ class Player {
     const rate = sorted.length > 5 ? ` · ${Math.round(1000 / sorted[sorted.length >> 1])} frames/s` : '';
     say('method', a.isLive || a.total === 1 ? NAMES[a.method] : `${NAMES[a.method]}, static look`);
     say('figures', `${count} ${layers} · atlas ${a.part.size.join('×')}${rate}`);
-    say('notice', a.notice === null ? '' : `Static look: ${a.notice}.`);
+    const shown = a.part.materials > 0 ? 'Its materials are shown as what was photographed there.' : '';
+    say('notice', a.notice === null ? shown : `Static look: ${a.notice}.`);
   }
 }
 

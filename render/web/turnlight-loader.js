@@ -255,7 +255,7 @@ async function readExtension(reader, index) {
   refuseSharedImages(reader, e);
   const texture = material.pbrMetallicRoughness?.baseColorTexture?.index;
   reader.image(list(reader.json.textures)[texture]?.source, size, 'its preview');
-  const part = { method: e.method, size, texture, mesh: readMesh(reader, index) };
+  const part = { method: e.method, size, texture, mesh: readMesh(reader, index), materials: list(e.materials).length };
   if (e.method === 'lumigraph') return Object.assign(part, readRays(reader, e, size));
   return Object.assign(part, await readLayers(reader, e, size));
 }

@@ -553,3 +553,56 @@ fn btf_synth_writes_a_material_whole_or_not_at_all() {
     assert_eq!(wrong.code, Some(2), "{}", wrong.stderr);
     assert!(wrong.stderr.contains("corduroy"), "{}", wrong.stderr);
 }
+
+#[test]
+fn a_material_is_drawn_and_takes_the_place_of_what_was_photographed() {
+    let place = place();
+    let done = |args: &[&str]| json(&turnlight(place.path(), &[args, &["--json", "--quiet"]].concat()));
+    done(&["btf", "synth", "analytic", "-o", "data", "--size", "4", "--samples", "1"]);
+    done(&["btf", "fit", "data", "-o", "m.btfz", "--codec", "pca", "--components", "4"]);
+    for (shape, light) in
+        [("tile", ["--light", "0,0,1"]), ("sphere", ["--point", "-2,-3,4"]), ("cloth", ["--exposure", "1"])]
+    {
+        let drawn = done(
+            &[&["btf", "render", "m.btfz", "-o", "a.png", "--shape", shape, "--size", "48x40"], &light[..]].concat(),
+        );
+        assert_eq!((&drawn["width"], &drawn["height"]), (&Value::from(48), &Value::from(40)), "{shape}");
+        let first = fs::read(place.path().join("a.png")).expect("a picture");
+        done(
+            &[
+                &["btf", "render", "m.btfz", "-o", "a.png", "--shape", shape, "--size", "48x40"],
+                &light[..],
+                &["--threads", "1"],
+            ]
+            .concat(),
+        );
+        assert_eq!(first, fs::read(place.path().join("a.png")).expect("a picture"), "{shape}: other bytes");
+    }
+    done(&["model", "capture", "-o", "plain.glb", "--method", "static"]);
+    done(&["model", "capture", "-o", "coated.glb", "--method", "static", "--material", "all=m.btfz@0.1"]);
+    let facts = done(&["info", "coated.glb"]);
+    let (material, bytes) = (&facts["materials"][0], fs::metadata(place.path().join("m.btfz")).expect("a file").len());
+    assert_eq!((&material["codec"], &facts["bytes"]["materials"]), (&Value::from("pca"), &Value::from(bytes)));
+    assert_eq!(material["charts"].as_array().map(|c| c.len() as u64), facts["charts"].as_u64());
+    let frames = |model: &str, light: &str| {
+        done(&["render", model, "--turntable", "1", "--size", "40x30", "-o", "frames", "--light", light]);
+        fs::read(place.path().join("frames/0000.png")).expect("a frame")
+    };
+    assert_eq!(frames("plain.glb", "1,0,0"), frames("plain.glb", "-1,0,0"));
+    assert_ne!(frames("coated.glb", "1,0,0"), frames("coated.glb", "-1,0,0"));
+    assert_fails(
+        place.path(),
+        &["btf", "render", "m.btfz", "-o", "b.png", "--environment", "m.btfz"],
+        &["m.btfz", ".exr"],
+    );
+    assert_fails(
+        place.path(),
+        &["btf", "render", "capture/transforms.json", "-o", "b.png"],
+        &["transforms.json", "btf fit"],
+    );
+    for wrong in ["7777=m.btfz", "all=m.btfz@-1", "m.btfz"] {
+        let run =
+            turnlight(place.path(), &["model", "capture", "-o", "b.glb", "--method", "static", "--material", wrong]);
+        assert_eq!(run.code, Some(2), "{wrong}: {}", run.stderr);
+    }
+}

@@ -9,6 +9,7 @@ use crate::appearance::{Lumigraph, static_texture::base_layer};
 use crate::coding;
 use crate::directions::{DirectionComplex, Layout};
 use crate::layers::{FacetWeights, Layer, Layers};
+use crate::material_layer::{self, MaterialLayer, charts_of_file};
 use crate::model::{Appearance, FitOptions, Method, Model};
 use crate::surface::{self, SurfaceTexels};
 use geometry::{Mesh, TexturedMesh};
@@ -63,6 +64,16 @@ struct Extension {
     ring_axis: Option<[f64; 3]>,
     #[serde(skip_serializing_if = "Option::is_none")]
     camera_centers: Option<usize>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    materials: Vec<MaterialEntry>,
+}
+
+#[derive(Debug, Serialize, Deserialize)]
+#[serde(rename_all = "camelCase")]
+struct MaterialEntry {
+    charts: Vec<u32>,
+    tile_size: f64,
+    buffer_view: usize,
 }
 
 #[derive(Debug, Serialize, Deserialize)]
@@ -143,11 +154,12 @@ fn assemble(model: &Model) -> Result<(Vec<u8>, u64), TextureError> {
     };
     let mut w = Writer::default();
     let primitive = write_mesh(&mut w, &model.mesh);
-    let (extension, preview) = match &model.appearance {
+    let (mut extension, preview) = match &model.appearance {
         Appearance::Layers(layers) => write_layers(&mut w, model, layers),
-        Appearance::Lumigraph(rays, surface) => write_lumigraph(&mut w, model, rays, surface),
+        Appearance::Lumigraph(rays, _) => write_lumigraph(&mut w, model, rays),
     }
     .ok_or_else(|| refused("a part of the model is empty or too large to be coded"))?;
+    extension.materials = write_materials(&mut w, model)?;
     let extension = serde_json::to_value(extension).map_err(|e| refused(&e.to_string()))?;
     let root = root(&w, primitive, extension, preview);
     let json = serde_json::to_vec(&root).map_err(|e| refused(&e.to_string()))?;
@@ -214,6 +226,7 @@ fn blank(model: &Model) -> Extension {
         rays: Vec::new(),
         ring_axis: None,
         camera_centers: None,
+        materials: Vec::new(),
     }
 }
 
@@ -223,8 +236,9 @@ fn write_layers(w: &mut Writer, model: &Model, layers: &Layers) -> Option<(Exten
     let mut e = blank(model);
     let (first, rest) = layers.layers.split_first()?;
     let preview = match model.method {
-        Method::Vdtm => Some(w.image(&base_layer(&layers.mean(), &FitOptions::default())?.coded, "preview".to_owned())),
-        _ => None,
+        Method::Vdtm => Some(write_preview(w, model)?),
+        _ if model.materials.is_empty() => None,
+        _ => Some(write_preview(w, model)?),
     };
     write_layer(w, &mut e, first);
     let map = layers.facet_of_texel.map(|f| [f.to_le_bytes()[0], f.to_le_bytes()[1], 0]);
@@ -239,6 +253,38 @@ fn write_layers(w: &mut Writer, model: &Model, layers: &Layers) -> Option<(Exten
 fn write_layer(w: &mut Writer, e: &mut Extension, layer: &Layer) {
     let image = w.part_image(&layer.coded, format!("layer {}", e.layers.len()));
     e.layers.push(LayerEntry { image, scale: layer.scale, offset: layer.offset });
+}
+
+/// What plain viewers show.
+fn write_preview(w: &mut Writer, model: &Model) -> Option<usize> {
+    Some(w.image(&base_layer(&model.still(), &FitOptions::default())?.coded, "preview".to_owned()))
+}
+
+/// The mesh as it will be read: so that a model that was read is written as it was.
+pub(crate) fn as_stored(mesh: &TexturedMesh) -> TexturedMesh {
+    let mut stored = mesh.clone();
+    let round = |v: &mut f64| *v = f64::from(*v as f32);
+    stored.mesh.positions.iter_mut().for_each(|p| p.iter_mut().for_each(round));
+    stored.uvs.iter_mut().for_each(|p| p.iter_mut().for_each(round));
+    stored
+}
+
+/// Materials lie on the charts as the reader will number them.
+fn write_materials(w: &mut Writer, model: &Model) -> Result<Vec<MaterialEntry>, TextureError> {
+    material_layer::check(&model.materials, &model.mesh.face_charts).map_err(material_layer::refused)?;
+    if model.materials.is_empty() {
+        return Ok(Vec::new());
+    }
+    let stored = charts_of_file(&model.mesh.mesh.faces, model.mesh.mesh.positions.len());
+    let write = |layer: &MaterialLayer| {
+        let faces = stored.iter().zip(&model.mesh.face_charts);
+        let mut charts: Vec<u32> =
+            faces.filter(|(_, chart)| layer.charts.binary_search(chart).is_ok()).map(|(&stored, _)| stored).collect();
+        charts.sort_unstable();
+        charts.dedup();
+        MaterialEntry { charts, tile_size: layer.tile_size, buffer_view: w.view(&layer.coded) }
+    };
+    Ok(model.materials.iter().map(write).collect())
 }
 
 fn write_facets(w: &mut Writer, e: &mut Extension, facets: &[FacetWeights], layers: usize) -> Option<()> {
@@ -310,15 +356,9 @@ fn read_direction(stored: [f64; 3]) -> Vector3<f64> {
     Vector3::from(stored).try_normalize(0.5).unwrap_or_default()
 }
 
-fn write_lumigraph(
-    w: &mut Writer,
-    model: &Model,
-    rays: &Lumigraph,
-    surface: &SurfaceTexels,
-) -> Option<(Extension, usize)> {
+fn write_lumigraph(w: &mut Writer, model: &Model, rays: &Lumigraph) -> Option<(Extension, usize)> {
     let mut e = blank(model);
-    let preview = base_layer(&rays.mean(surface), &FitOptions::default())?;
-    let preview = w.image(&preview.coded, "preview".to_owned());
+    let preview = write_preview(w, model)?;
     let centers: Vec<u8> =
         rays.centers.iter().flat_map(|c| [c.x, c.y, c.z]).flat_map(|v| (v as f32).to_le_bytes()).collect();
     e.camera_centers = w.part(&centers, FLOAT, "VEC3", rays.centers.len());
@@ -380,14 +420,19 @@ impl<'a> Reader<'a> {
         if has_address { Err("it names other files, which is not followed".to_owned()) } else { Ok(()) }
     }
 
-    /// Refuses layers that decode the same bytes again and again: a small file could ask for any memory.
-    fn refuse_shared_images(&self, e: &Extension) -> Result<(), String> {
+    /// Refuses layers and materials that decode the same bytes again and again: a small file could ask for any memory.
+    fn refuse_shared_bytes(&self, e: &Extension) -> Result<(), String> {
         let rays = e.rays.iter().flat_map(|ray| [ray.color, ray.view]);
         let mut bytes = 0usize;
         for image in e.layers.iter().map(|layer| layer.image).chain(rays) {
             bytes = bytes.saturating_add(self.image(image)?.len());
         }
-        if bytes > self.bin.len() { Err("its layers share images".to_owned()) } else { Ok(()) }
+        if bytes > self.bin.len() {
+            return Err("its layers share images".to_owned());
+        }
+        let materials = e.materials.iter().map(|entry| Ok(self.view(entry.buffer_view)?.len()));
+        let bytes = materials.sum::<Result<usize, String>>()?;
+        if bytes > self.bin.len() { Err("its materials share bytes".to_owned()) } else { Ok(()) }
     }
 
     fn floats(&self, index: usize, kind: &str, per: usize) -> Result<Vec<f64>, String> {
@@ -442,12 +487,23 @@ pub(crate) fn read(bytes: &[u8]) -> Result<Model, String> {
         return Err(format!("an atlas of {:?} texels", e.atlas_size));
     }
     reader.refuse_addresses()?;
-    reader.refuse_shared_images(&e)?;
+    reader.refuse_shared_bytes(&e)?;
     let method: Method = e.method.parse()?;
     let mesh = read_mesh(&reader, e.atlas_size)?;
     let appearance =
         if method == Method::Lumigraph { read_lumigraph(&reader, &e, &mesh)? } else { read_layers(&reader, &e)? };
-    Ok(Model { mesh, method, appearance })
+    let materials = read_materials(&reader, &e, &mesh)?;
+    Ok(Model { mesh, method, appearance, materials })
+}
+
+fn read_materials(r: &Reader<'_>, e: &Extension, mesh: &TexturedMesh) -> Result<Vec<MaterialLayer>, String> {
+    let read = |(k, entry): (usize, &MaterialEntry)| {
+        let layer = MaterialLayer::new(entry.charts.clone(), entry.tile_size, r.view(entry.buffer_view)?.to_vec());
+        layer.map_err(|fault| format!("material {k}: {fault}"))
+    };
+    let layers = e.materials.iter().enumerate().map(read).collect::<Result<Vec<_>, _>>()?;
+    material_layer::check(&layers, &mesh.face_charts)?;
+    Ok(layers)
 }
 
 fn read_mesh(r: &Reader<'_>, atlas_size: [usize; 2]) -> Result<TexturedMesh, String> {
@@ -471,39 +527,8 @@ fn read_mesh(r: &Reader<'_>, atlas_size: [usize; 2]) -> Result<TexturedMesh, Str
     }
     let faces = indices.as_chunks::<3>().0.to_vec();
     let mesh = Mesh { positions, faces };
-    let face_charts = connected_charts(&mesh);
+    let face_charts = charts_of_file(&mesh.faces, mesh.positions.len());
     Ok(TexturedMesh { mesh, uvs, face_charts, atlas_size })
-}
-
-/// Charts are the parts that share no vertex; numbered by their first face.
-fn connected_charts(mesh: &Mesh) -> Vec<u32> {
-    let mut parent: Vec<u32> = (0..mesh.positions.len() as u32).collect();
-    fn find(parent: &mut [u32], mut v: u32) -> u32 {
-        while parent[v as usize] != v {
-            parent[v as usize] = parent[parent[v as usize] as usize];
-            v = parent[v as usize];
-        }
-        v
-    }
-    for &[a, b, c] in &mesh.faces {
-        for other in [b, c] {
-            let (x, y) = (find(&mut parent, a), find(&mut parent, other));
-            parent[x.max(y) as usize] = x.min(y);
-        }
-    }
-    let mut number = vec![u32::MAX; mesh.positions.len()];
-    let mut next = 0;
-    mesh.faces
-        .iter()
-        .map(|f| {
-            let root = find(&mut parent, f[0]) as usize;
-            if number[root] == u32::MAX {
-                number[root] = next;
-                next += 1;
-            }
-            number[root]
-        })
-        .collect()
 }
 
 fn read_layers(r: &Reader<'_>, e: &Extension) -> Result<Appearance, String> {

@@ -15,15 +15,18 @@ mod error;
 mod facets;
 mod glb;
 mod layers;
+mod material_layer;
 pub mod metrics;
 mod model;
 mod observe;
 mod surface;
+pub mod tile;
 
 pub use bake::Bake;
 pub use error::TextureError;
 pub use facets::Facets;
 pub use glb::EXTENSION;
 pub use layers::{FacetWeights, Layer, Layers};
+pub use material_layer::{MaterialLayer, charts_of_file};
 pub use model::{Appearance, FitOptions, FitReport, Method, Model, ModelBytes, fit};
 pub use surface::SurfaceTexels;

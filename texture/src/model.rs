@@ -5,6 +5,7 @@ use crate::appearance::{Lumigraph, dyntex, lumigraph, static_texture, vdtm};
 use crate::bake::Bake;
 use crate::glb;
 use crate::layers::Layers;
+use crate::material_layer::{self, MaterialLayer, charts_of_file};
 use crate::surface::SurfaceTexels;
 use capture::Image;
 use geometry::TexturedMesh;
@@ -70,6 +71,8 @@ pub struct Model {
     pub method: Method,
     /// The appearance.
     pub appearance: Appearance,
+    /// What lies on charts in its place; no chart has two ([`Model::lay`]).
+    pub materials: Vec<MaterialLayer>,
 }
 
 /// Bytes of a model, as stored in its file and raw.
@@ -81,6 +84,8 @@ pub struct ModelBytes {
     pub appearance: u64,
     /// Layers as 8-bit raw texels, without weights.
     pub appearance_raw: u64,
+    /// Materials as stored.
+    pub materials: u64,
 }
 
 impl Method {
@@ -136,7 +141,7 @@ pub fn fit(bake: &Bake<'_>, method: Method, options: &FitOptions) -> Result<(Mod
         Appearance::Lumigraph(..) => Vec::new(),
     };
     let report = FitReport { texels: bake.surface.len(), unseen_texels, ranks };
-    Ok((Model { mesh: bake.mesh.clone(), method, appearance }, report))
+    Ok((Model { mesh: bake.mesh.clone(), method, appearance, materials: Vec::new() }, report))
 }
 
 fn layered((layers, unseen): (Layers, usize)) -> (Appearance, usize) {
@@ -153,13 +158,33 @@ impl Model {
     }
 
     /// The texture that viewers without our extension show, in levels of 0..=255: the first layer of a static texture and
-    /// of DynTex, the mean of the layers of VDTM, of the rays of a lumigraph.
+    /// of DynTex, the mean of the layers of VDTM, of the rays of a lumigraph; under the materials.
     pub fn still(&self) -> Image<[f32; 3]> {
-        match &self.appearance {
+        let mut still = match &self.appearance {
             Appearance::Layers(layers) if self.method == Method::Vdtm => layers.mean(),
             Appearance::Layers(layers) => layers.first(),
             Appearance::Lumigraph(rays, surface) => rays.mean(surface),
-        }
+        };
+        material_layer::paint(&mut still, &glb::as_stored(&self.mesh), &self.materials);
+        still
+    }
+
+    /// Numbers the charts as the model's file does ([`charts_of_file`]). Tells how many there are.
+    pub fn number_charts(&mut self) -> usize {
+        self.mesh.face_charts = charts_of_file(&self.mesh.mesh.faces, self.mesh.mesh.positions.len());
+        self.mesh.face_charts.iter().max().map_or(0, |&chart| chart as usize + 1)
+    }
+
+    /// Lays materials over charts in place of the appearance, and of materials laid before; the charts are those of
+    /// [`Model::number_charts`], which is done first.
+    ///
+    /// # Errors
+    /// Where a chart is not there, or gets two.
+    pub fn lay(&mut self, materials: Vec<MaterialLayer>) -> Result<(), TextureError> {
+        self.number_charts();
+        material_layer::check(&materials, &self.mesh.face_charts).map_err(material_layer::refused)?;
+        self.materials = materials;
+        Ok(())
     }
 
     /// The model as one binary glTF (`docs/model-format.md`).
@@ -192,6 +217,7 @@ impl Model {
             Appearance::Layers(layers) => layers.raw_bytes(),
             Appearance::Lumigraph(rays, _) => 5 * rays.views.len() as u64,
         };
-        Ok(ModelBytes { file, appearance, appearance_raw })
+        let materials = self.materials.iter().map(|layer| layer.coded.len() as u64).sum();
+        Ok(ModelBytes { file, appearance, appearance_raw, materials })
     }
 }

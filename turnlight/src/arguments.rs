@@ -6,6 +6,7 @@ use turnlight::Selection;
 use turnlight::capture::Board;
 use turnlight::capture::board::{Dictionary, Paper, parse_length};
 use turnlight::export::web::AXES;
+use turnlight::swatch::Shape;
 use turnlight::texture::btf::{Budget, CodecKind, Precision};
 
 /// What this build can and cannot do.
@@ -132,6 +133,8 @@ pub(crate) enum BtfCommand {
     Eval(BtfEvalArgs),
     /// Fit all codecs at several sizes, and compare size, error and speed
     Compare(BtfCompareArgs),
+    /// Draw a coded material under light: flat, on a ball, a cloth or a mesh
+    Render(BtfRenderArgs),
 }
 
 /// Measured data and how they are read.
@@ -221,6 +224,64 @@ pub(crate) struct BtfCompareArgs {
     /// Seed of everything random
     #[arg(long, default_value = "1")]
     pub(crate) seed: u64,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct BtfRenderArgs {
+    /// The coded material
+    pub(crate) material: PathBuf,
+    /// The picture to write
+    #[arg(short, long, value_name = "FILE.png")]
+    pub(crate) output: PathBuf,
+    /// tile, sphere, cloth, or a mesh with texture coordinates (.obj .ply .glb); z is up
+    #[arg(long, default_value = "sphere")]
+    pub(crate) shape: Shape,
+    /// Repetitions across the picture of a tile, around a sphere, across a cloth, along a mesh's longest side
+    #[arg(long, value_name = "N", default_value = "8", value_parser = tiles)]
+    pub(crate) tiles: f64,
+    /// Where it is seen from, in degrees: polar angle from +z, azimuth from +x [default: 62,-90; 0,0 of a tile]
+    #[arg(long, value_name = "THETA,PHI", value_parser = angles, allow_hyphen_values = true)]
+    pub(crate) view: Option<[f64; 2]>,
+    /// Size of the picture
+    #[arg(long, value_name = "WxH", default_value = "512x512", value_parser = size)]
+    pub(crate) size: [usize; 2],
+    /// What stands behind, 0 to 255 [default: nothing, transparent]
+    #[arg(long, value_name = "R,G,B", value_parser = colour)]
+    pub(crate) background: Option<[u8; 3]>,
+    /// Seed of synthesis
+    #[arg(long, default_value = "1")]
+    pub(crate) seed: u64,
+    #[command(flatten)]
+    pub(crate) light: LightArgs,
+}
+
+/// What shines on materials; several lights add up.
+#[derive(Clone, Debug, Args)]
+#[command(next_help_heading = "Light on materials")]
+pub(crate) struct LightArgs {
+    /// Towards a far light under which white paint is white [default: over the left shoulder of whoever looks]
+    #[arg(long, value_name = "X,Y,Z", value_parser = direction, allow_hyphen_values = true)]
+    pub(crate) light: Option<[f64; 3]>,
+    /// Place of a lamp, in the middle of the object as bright as a far light
+    #[arg(long, value_name = "X,Y,Z", value_parser = vector, allow_hyphen_values = true)]
+    pub(crate) point: Option<[f64; 3]>,
+    /// Light from a panorama, longitude by latitude, +z at the top, +x in the middle (.exr; .png .jpg as sRGB)
+    #[arg(long, value_name = "FILE")]
+    pub(crate) environment: Option<PathBuf>,
+    /// Far lights that stand for the panorama
+    #[arg(long, value_name = "N", default_value = "32", requires = "environment", value_parser = lights)]
+    pub(crate) environment_lights: usize,
+    /// Brighten materials by so many stops
+    #[arg(long, value_name = "STOPS", default_value = "0", value_parser = stops, allow_negative_numbers = true)]
+    pub(crate) exposure: f64,
+}
+
+/// A material and where it lies.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct MaterialArg {
+    pub(crate) charts: Selection,
+    pub(crate) file: PathBuf,
+    pub(crate) tile_size: Option<f64>,
 }
 
 impl From<PrecisionArg> for Precision {
@@ -495,6 +556,10 @@ pub(crate) struct ModelArgs {
     /// The appearance
     #[arg(long, value_enum, default_value = "dyntex")]
     pub(crate) method: MethodArg,
+    /// Lay a coded material over charts (all, or a list like 0,4,9-12) in place of what was photographed; SIZE of a
+    /// tile in world units [default: as measured]; may be given again
+    #[arg(long, value_name = "CHARTS=FILE[@SIZE]", value_parser = material)]
+    pub(crate) material: Vec<MaterialArg>,
     #[command(flatten)]
     pub(crate) mesh: MeshArgs,
     #[command(flatten)]
@@ -532,6 +597,8 @@ pub(crate) struct RenderArgs {
     /// Reduce the frames by this whole factor
     #[arg(long, value_name = "N", default_value = "1", value_parser = whole_factor)]
     pub(crate) downscale: usize,
+    #[command(flatten)]
+    pub(crate) light: LightArgs,
 }
 
 #[derive(Debug, Args)]
@@ -748,6 +815,43 @@ fn frames(text: &str) -> Result<usize, String> {
     bounded(text, 100_000)
 }
 
+fn lights(text: &str) -> Result<usize, String> {
+    bounded(text, 4096)
+}
+
+fn stops(text: &str) -> Result<f64, String> {
+    within(text, -64.0, 64.0)
+}
+
+fn tiles(text: &str) -> Result<f64, String> {
+    within(text, 0.01, 10_000.0)
+}
+
+fn angles(text: &str) -> Result<[f64; 2], String> {
+    let (polar, azimuth) = text.split_once(',').ok_or("needs two angles in degrees, as in 30,90")?;
+    Ok([within(polar.trim(), 0.0, 180.0)?, within(azimuth.trim(), -360.0, 360.0)?])
+}
+
+fn colour(text: &str) -> Result<[u8; 3], String> {
+    let levels: Vec<u8> = text.split(',').filter_map(|word| word.trim().parse().ok()).collect();
+    match levels.as_slice() {
+        &[r, g, b] if text.split(',').count() == 3 => Ok([r, g, b]),
+        _ => Err("needs three levels from 0 to 255, as in 255,255,255".to_owned()),
+    }
+}
+
+fn material(text: &str) -> Result<MaterialArg, String> {
+    let (charts, file) =
+        text.split_once('=').ok_or("needs charts and a file, as in all=wool.btfz or 0,4=wool.btfz@0.02")?;
+    let charts = charts.parse().map_err(|fault: String| format!("charts: {fault}"))?;
+    let sized = file.rsplit_once('@').and_then(|(file, size)| Some((file, size.parse::<f64>().ok()?)));
+    match sized {
+        Some((_, size)) if !(size > 0.0 && size.is_finite()) => Err(format!("a tile cannot measure {size}")),
+        Some((file, size)) => Ok(MaterialArg { charts, file: file.into(), tile_size: Some(size) }),
+        None => Ok(MaterialArg { charts, file: file.into(), tile_size: None }),
+    }
+}
+
 fn texels(text: &str) -> Result<usize, String> {
     bounded(text, 1024)
 }
@@ -868,6 +972,14 @@ mod tests {
         for text in ["0,0,0", "1,2", "1,2,3,4", "1,,2", "nan,0,1", "w"] {
             assert!(direction(text).is_err(), "{text}");
         }
+        assert_eq!(angles("30, -90"), Ok([30.0, -90.0]));
+        assert_eq!(colour("1,2,255"), Ok([1, 2, 255]));
+        assert!(angles("30").is_err() && angles("nan,1").is_err() && colour("1,2,256").is_err());
+        let laid = material("0,4-5=some@home.btfz@0.5").expect("a material");
+        assert_eq!((laid.charts, laid.tile_size), (Selection::List(vec![0, 4, 5]), Some(0.5)));
+        assert_eq!(laid.file, PathBuf::from("some@home.btfz"));
+        assert_eq!(material("all=m.btfz").map(|m| m.tile_size), Ok(None));
+        assert!(material("m.btfz").is_err() && material("x=m").is_err() && material("all=m@0").is_err());
         assert!(step("0").is_err() && step("-10") == Ok(-10.0));
     }
 }

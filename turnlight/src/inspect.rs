@@ -7,7 +7,7 @@ use geometry::depth::silhouette_iou;
 use geometry::{GeometryError, Mesh};
 use rayon::prelude::*;
 use serde::Serialize;
-use texture::{Appearance, Model};
+use texture::{Appearance, MaterialLayer, Model};
 
 /// A box, corner by corner.
 pub type Corners = [[f64; 3]; 2];
@@ -45,8 +45,27 @@ pub struct ModelFacts {
     pub ranks: Vec<usize>,
     /// Width and height of the atlas in texels.
     pub atlas: [usize; 2],
+    /// Charts of the atlas, which materials are laid on.
+    pub charts: usize,
+    /// Materials in place of the appearance.
+    pub materials: Vec<MaterialFacts>,
     /// Bytes, part by part.
     pub bytes: PartBytes,
+}
+
+/// What a material of a model holds.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct MaterialFacts {
+    /// What was measured.
+    pub name: String,
+    /// The codec.
+    pub codec: &'static str,
+    /// The charts it lies on.
+    pub charts: Vec<u32>,
+    /// World units across a repetition.
+    pub tile_size: f64,
+    /// As stored.
+    pub bytes: u64,
 }
 
 /// Bytes of a model file.
@@ -56,6 +75,8 @@ pub struct PartBytes {
     pub file: u64,
     /// Layers, weights and directions, as stored.
     pub appearance: u64,
+    /// Materials, as stored.
+    pub materials: u64,
     /// Mesh, preview and description.
     pub rest: u64,
     /// The appearance as raw 8-bit layers; not in the file.
@@ -95,13 +116,26 @@ pub fn model_facts(model: &Model) -> Result<ModelFacts, Error> {
         facets: ranks.len(),
         ranks,
         atlas: model.mesh.atlas_size,
+        charts: model.mesh.face_charts.iter().max().map_or(0, |&chart| chart as usize + 1),
+        materials: model.materials.iter().map(material_facts).collect(),
         bytes: PartBytes {
             file: bytes.file,
             appearance: bytes.appearance,
-            rest: bytes.file.saturating_sub(bytes.appearance),
+            materials: bytes.materials,
+            rest: bytes.file.saturating_sub(bytes.appearance + bytes.materials),
             appearance_raw: bytes.appearance_raw,
         },
     })
+}
+
+fn material_facts(layer: &MaterialLayer) -> MaterialFacts {
+    MaterialFacts {
+        name: layer.material.name.clone(),
+        codec: layer.material.codec.kind().name(),
+        charts: layer.charts.clone(),
+        tile_size: layer.tile_size,
+        bytes: layer.coded.len() as u64,
+    }
 }
 
 /// How well a mesh fits each silhouette.
@@ -168,12 +202,18 @@ impl ModelFacts {
     pub fn text(&self) -> String {
         let [width, height] = self.atlas;
         let mean_rank = self.ranks.iter().sum::<usize>() as f64 / self.ranks.len().max(1) as f64;
+        let materials = self
+            .materials
+            .iter()
+            .map(|m| format!("\nmaterial {} ({}, {} bytes) on {} charts", m.name, m.codec, m.bytes, m.charts.len()));
         format!(
-            "{}\n{}: {} facets of {mean_rank:.1} layers in the mean, atlas {width} × {height}\n\
+            "{}\n{}: {} facets of {mean_rank:.1} layers in the mean, atlas {width} × {height}, {} charts{}\n\
              {} bytes: appearance {} (raw {}), mesh and preview {}",
             self.mesh.text(),
             self.method,
             self.facets,
+            self.charts,
+            materials.collect::<String>(),
             self.bytes.file,
             self.bytes.appearance,
             self.bytes.appearance_raw,

@@ -11,9 +11,11 @@
 //! - [`footage_report`]: what became of footage, as a page;
 //! - [`inspect`]: what a mesh, a model or a capture holds;
 //! - [`output`]: files and folders that appear whole or not at all;
+//! - [`panorama`]: light from all around;
 //! - [`serve`]: a model and its player on loopback;
 //! - [`shading`]: how the object is lit over a turn;
 //! - [`stages`]: what each stage costs;
+//! - [`swatch`]: a material on show;
 //! - [`truth`]: a mesh held against the true one.
 
 pub mod btf;
@@ -26,12 +28,14 @@ pub mod footage;
 pub mod footage_report;
 pub mod inspect;
 pub mod output;
+pub mod panorama;
 pub mod pipeline;
 pub mod playback;
 mod selection;
 pub mod serve;
 pub mod shading;
 pub mod stages;
+pub mod swatch;
 pub mod truth;
 
 pub use error::Error;

@@ -5,6 +5,7 @@ use super::setup::{EdgeFace, Linear};
 use super::visibility::{NONE, Nearest};
 use crate::face::corners;
 use crate::filter::level_of_footprint;
+use crate::material::Coats;
 use geometry::TexturedMesh;
 
 /// What a visible sub-sample looks up.
@@ -14,7 +15,7 @@ pub(super) struct Fragment {
     pub(super) x: f32,
     /// Row in texels of level 0.
     pub(super) y: f32,
-    /// Fractional mip level.
+    /// Fractional mip level; of what carries a material, the squared side of its footprint in texels.
     pub(super) level: f32,
 }
 
@@ -25,6 +26,8 @@ pub(super) struct Fragments {
     pub(super) counts: Vec<u16>,
     /// Those sub-samples, in the order of the pixels.
     pub(super) fragments: Vec<Fragment>,
+    /// Their faces, where anything carries a material; [`NONE`] where the face itself does not.
+    pub(super) coated: Vec<u32>,
     level: f32,
 }
 
@@ -36,6 +39,8 @@ pub(super) struct Scene<'a> {
     pub(super) faces: &'a [EdgeFace],
     /// Texels across and down.
     pub(super) atlas_size: [usize; 2],
+    /// What lies on the mesh.
+    pub(super) coats: Option<&'a Coats<'a>>,
 }
 
 impl Fragments {
@@ -48,6 +53,7 @@ impl Fragments {
     pub(super) fn find(&mut self, scene: &Scene, tile: usize, candidates: &[u32], nearest: &mut Nearest) {
         self.counts.clear();
         self.fragments.clear();
+        self.coated.clear();
         self.level = 0.0;
         if candidates.is_empty() {
             return;
@@ -76,8 +82,15 @@ impl Fragments {
                         made[slot] = surfaces.len() as u32;
                         surfaces.push(surface);
                     }
-                    let fragment = surfaces[made[slot] as usize].fragment(scene.samples.ideal(column, row));
-                    self.level = self.level.max(fragment.level);
+                    let surface = &surfaces[made[slot] as usize];
+                    let mut fragment = surface.fragment(scene.samples.ideal(column, row));
+                    if scene.coats.is_some() {
+                        self.coated.push(surface.coated);
+                    }
+                    if surface.coated == NONE {
+                        fragment.level = level_of_footprint(fragment.level);
+                        self.level = self.level.max(fragment.level);
+                    }
                     self.fragments.push(fragment);
                 }
             }
@@ -91,7 +104,9 @@ impl Scene<'_> {
         let face = &self.faces[index as usize];
         let [width, height] = self.atlas_size.map(|size| size as f64);
         let texels = corners(self.mesh, face.face as usize)?.uvs.map(|uv| [uv.x * width, uv.y * height]);
-        Some(Surface::new(face, &texels, self.samples.per_side()))
+        let is_coated = self.coats.is_some_and(|coats| coats.cover(face.face as usize));
+        let coated = if is_coated { face.face } else { NONE };
+        Some(Surface { coated, ..Surface::new(face, &texels, self.samples.per_side()) })
     }
 }
 
@@ -108,6 +123,8 @@ struct Surface {
     dy: [[f64; 2]; 2],
     /// Squared distance of sub-samples in pixels.
     spacing_squared: f64,
+    /// The face, if it carries a material; otherwise [`NONE`].
+    coated: u32,
 }
 
 impl Surface {
@@ -131,9 +148,11 @@ impl Surface {
             dx: [dx(&u), dx(&v)],
             dy: [dy(&u), dy(&v)],
             spacing_squared: 1.0 / (per_side * per_side) as f64,
+            coated: NONE,
         }
     }
 
+    /// With the squared side of its footprint for a level.
     #[inline]
     fn fragment(&self, [x, y]: [f64; 2]) -> Fragment {
         let at = |l: &Linear| l[0] * x + (l[1] * y + l[2]);
@@ -148,7 +167,7 @@ impl Surface {
         Fragment {
             x: (self.origin[0] + at(&self.u) * inverse) as f32,
             y: (self.origin[1] + at(&self.v) * inverse) as f32,
-            level: level_of_footprint(footprint as f32),
+            level: footprint as f32,
         }
     }
 }

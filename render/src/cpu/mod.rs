@@ -8,7 +8,7 @@
 //! 2. *visibility*: tile by tile, the nearest face of each sub-sample, then its texture coordinates
 //!    and mip level;
 //! 3. *mips*: only as many levels as some visible sub-sample asks for;
-//! 4. *shading*: one trilinear lookup per visible sub-sample.
+//! 4. *shading*: one trilinear lookup per visible sub-sample, or its material.
 //!
 //! Edge functions are evaluated in `f64` and are exactly opposite on both sides of a shared edge, so
 //! a sub-sample on the edge belongs to one of the two faces, never to both or none.
@@ -23,12 +23,14 @@ mod shade;
 mod visibility;
 
 use crate::filter::MipChain;
+use crate::material::Lit;
 use crate::{RenderOptions, frame_size, is_usable, resolve};
 use capture::{Camera, Image};
 use fragments::{Fragments, Scene};
 use geometry::TexturedMesh;
 use rayon::prelude::*;
 use samples::Samples;
+use shade::Look;
 use std::time::{Duration, Instant};
 use visibility::Nearest;
 
@@ -66,6 +68,17 @@ pub fn render(
     Player::new(mesh, *options).render(atlas, camera)
 }
 
+/// The same with materials, which must have been laid over `mesh`; as [`crate::reference::render_lit`].
+pub fn render_lit(
+    mesh: &TexturedMesh,
+    atlas: &Image<[f32; 3]>,
+    lit: &Lit<'_>,
+    camera: &Camera,
+    options: &RenderOptions,
+) -> Image<[u8; 4]> {
+    Player::new(mesh, *options).render_lit(atlas, lit, camera)
+}
+
 impl<'a> Player<'a> {
     /// A player of `mesh`.
     pub fn new(mesh: &'a TexturedMesh, options: RenderOptions) -> Self {
@@ -80,6 +93,15 @@ impl<'a> Player<'a> {
     /// Draws one frame with `atlas` (encoded 0..=255, unclamped): RGBA, 8 bit encoded, not
     /// premultiplied, alpha the share of covered sub-samples. See [`crate::reference::render`].
     pub fn render(&mut self, atlas: &Image<[f32; 3]>, camera: &Camera) -> Image<[u8; 4]> {
+        self.draw(atlas, None, camera)
+    }
+
+    /// The same with materials, which must have been laid over the player's mesh.
+    pub fn render_lit(&mut self, atlas: &Image<[f32; 3]>, lit: &Lit<'_>, camera: &Camera) -> Image<[u8; 4]> {
+        self.draw(atlas, Some(lit), camera)
+    }
+
+    fn draw(&mut self, atlas: &Image<[f32; 3]>, lit: Option<&Lit<'_>>, camera: &Camera) -> Image<[u8; 4]> {
         self.times = StageTimes::default();
         let (width, height) = frame_size(camera);
         let nothing = resolve::Accumulator::default().finish(1, self.options.background);
@@ -97,7 +119,8 @@ impl<'a> Player<'a> {
         let faces = setup::faces(self.mesh, camera);
         let bins = samples.bin(&faces);
         let binned = Instant::now();
-        let scene = Scene { samples, mesh: self.mesh, faces: &faces, atlas_size: [atlas.width(), atlas.height()] };
+        let (atlas_size, coats) = ([atlas.width(), atlas.height()], lit.map(|lit| lit.coats));
+        let scene = Scene { samples, mesh: self.mesh, faces: &faces, atlas_size, coats };
         self.tiles.resize_with(samples.tiles(), Fragments::default);
         let find = |nearest: &mut Nearest, (tile, fragments): (usize, &mut Fragments)| {
             fragments.find(&scene, tile, bins.of(tile), nearest);
@@ -107,7 +130,8 @@ impl<'a> Player<'a> {
         let top = self.tiles.iter().map(Fragments::top_level).max().unwrap_or(0);
         let chain = MipChain::build(atlas, top);
         let reduced = Instant::now();
-        shade::frame(&mut frame, samples, &self.tiles, &chain, self.options.background);
+        let look = Look { chain: &chain, lit, eye: camera.center(), background: self.options.background };
+        shade::frame(&mut frame, samples, &self.tiles, &look);
         self.times = StageTimes {
             setup: binned - start,
             visibility: seen - binned,

@@ -20,6 +20,7 @@ pub(crate) fn run(command: &BtfCommand, observer: &dyn Observer) -> Result<Answe
         BtfCommand::Fit(args) => fit(args, observer),
         BtfCommand::Eval(args) => eval(args, observer),
         BtfCommand::Compare(args) => compare(args, observer),
+        BtfCommand::Render(args) => super::btf_render::run(args, observer),
     }
 }
 
@@ -118,7 +119,7 @@ fn eval(args: &BtfEvalArgs, observer: &dyn Observer) -> Result<Answer, Error> {
     Ok(Answer { text, json: json!(found) })
 }
 
-fn read_material(path: &Path) -> Result<Material, Error> {
+pub(super) fn read_material(path: &Path) -> Result<Material, Error> {
     let bytes = std::fs::read(path).map_err(|fault| Error::Failed(format!("{}: {fault}", path.display())))?;
     let remedy = "fit it again with `turnlight btf fit`".to_owned();
     let material = Material::from_bytes(&bytes).map_err(|fault| TextureError::Invalid {

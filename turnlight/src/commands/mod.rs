@@ -2,6 +2,7 @@
 
 pub(crate) mod board;
 pub(crate) mod btf;
+mod btf_render;
 pub(crate) mod capture;
 pub(crate) mod compare;
 pub(crate) mod demo;
@@ -9,6 +10,8 @@ pub(crate) mod export;
 pub(crate) mod hull;
 pub(crate) mod import;
 pub(crate) mod info;
+mod light;
+mod material;
 pub(crate) mod model;
 pub(crate) mod render;
 pub(crate) mod synth;

@@ -1,6 +1,6 @@
 //! `turnlight model`
 
-use super::check_extension;
+use super::{check_extension, material};
 use crate::Answer;
 use crate::arguments::ModelArgs;
 use serde_json::json;
@@ -12,7 +12,8 @@ pub(crate) fn run(args: &ModelArgs, observer: &dyn Observer) -> Result<Answer, E
     let mut stages = Stages::new(observer);
     let (capture, views) = args.capture.load(&args.views, &mut stages)?;
     let (shape, fit) = (args.mesh.options(), args.fit.options());
-    let (model, report) = pipeline::model(&views, capture.aabb, args.method.into(), &shape, &fit, &mut stages)?;
+    let (mut model, report) = pipeline::model(&views, capture.aabb, args.method.into(), &shape, &fit, &mut stages)?;
+    material::lay(&mut model, &args.material, capture.unit, observer)?;
     stages.run("write", |_| output::write_file(&args.output, &model.to_glb()?))?;
     let facts = inspect::model_facts(&model)?;
     let unseen = 100.0 * report.unseen_texels as f64 / report.texels.max(1) as f64;

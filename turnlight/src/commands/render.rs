@@ -8,6 +8,7 @@ use std::time::Instant;
 use turnlight::capture::{Aabb, Camera, Capture, Image};
 use turnlight::output::OutputFolder;
 use turnlight::render::film::write_png;
+use turnlight::render::material::Lit;
 use turnlight::render::path::{turntable_cameras, up_axis};
 use turnlight::stages::{Observer, Stages};
 use turnlight::texture::Model;
@@ -97,9 +98,16 @@ fn draw(
     observer: &dyn Observer,
 ) -> Result<(), Error> {
     let mut player = playback::player(model);
+    let tiles = playback::tiles(model);
+    let coats = playback::coats(model, &tiles);
+    let lamps = args.light.lamps(model.mesh.mesh.aabb().map_or([0.0; 3], |aabb| aabb.center().into()))?;
     let mut frame = |i: usize, camera: &Camera| {
         let start = Instant::now();
-        let frame = player.render(&model.atlas(&camera.center()), camera);
+        let atlas = model.atlas(&camera.center());
+        let frame = match &coats {
+            None => player.render(&atlas, camera),
+            Some(coats) => player.render_lit(&atlas, &Lit { coats, lighting: &lamps.seen_by(camera) }, camera),
+        };
         times_ms.push(start.elapsed().as_secs_f64() * 1e3);
         observer.advanced(i + 1, cameras.len());
         frame
