@@ -26,6 +26,7 @@ pub mod material;
 pub mod path;
 pub mod reference;
 mod resolve;
+pub mod web;
 
 pub use error::RenderError;
 

@@ -12,7 +12,6 @@ use crate::layers::{FacetWeights, Layer, Layers};
 use crate::material_layer::{self, MaterialLayer, charts_of_file};
 use crate::model::{Appearance, FitOptions, Method, Model};
 use crate::surface::{self, SurfaceTexels};
-use capture::Image;
 use geometry::{Mesh, TexturedMesh};
 use gltf::binary::{Glb, Header};
 use nalgebra::{Point2, Point3, Vector3};
@@ -157,7 +156,7 @@ fn assemble(model: &Model) -> Result<(Vec<u8>, u64), TextureError> {
     let primitive = write_mesh(&mut w, &model.mesh);
     let (mut extension, preview) = match &model.appearance {
         Appearance::Layers(layers) => write_layers(&mut w, model, layers),
-        Appearance::Lumigraph(rays, surface) => write_lumigraph(&mut w, model, rays, surface),
+        Appearance::Lumigraph(rays, _) => write_lumigraph(&mut w, model, rays),
     }
     .ok_or_else(|| refused("a part of the model is empty or too large to be coded"))?;
     extension.materials = write_materials(&mut w, model)?;
@@ -231,33 +230,38 @@ fn blank(model: &Model) -> Extension {
     }
 }
 
-/// Writes layers and weights; also gives the image that plain viewers show.
+/// Writes layers and weights; also gives the image that plain viewers show. What a first look and all weights need comes
+/// first: a player in a browser shows that while the other layers are on their way.
 fn write_layers(w: &mut Writer, model: &Model, layers: &Layers) -> Option<(Extension, usize)> {
     let mut e = blank(model);
-    for (k, layer) in layers.layers.iter().enumerate() {
-        let image = w.part_image(&layer.coded, format!("layer {k}"));
-        e.layers.push(LayerEntry { image, scale: layer.scale, offset: layer.offset });
-    }
+    let (first, rest) = layers.layers.split_first()?;
+    let preview = match model.method {
+        Method::Vdtm => Some(write_preview(w, model)?),
+        _ if model.materials.is_empty() => None,
+        _ => Some(write_preview(w, model)?),
+    };
+    write_layer(w, &mut e, first);
     let map = layers.facet_of_texel.map(|f| [f.to_le_bytes()[0], f.to_le_bytes()[1], 0]);
     e.facet_map = Some(w.part_image(&coding::encode_png(&map)?, "facet map".to_owned()));
     e.ring_axis = layers.facets.iter().find_map(|f| f.complex.ring()).map(Into::into);
-    write_facets(w, &mut e, &layers.facets)?;
-    let preview = match model.method {
-        Method::Vdtm => write_preview(w, model, mean_of_layers(layers))?,
-        _ if model.materials.is_empty() => e.layers.first()?.image,
-        _ => write_preview(w, model, first_layer(layers)?)?,
-    };
+    write_facets(w, &mut e, &layers.facets, layers.layers.len())?;
+    rest.iter().for_each(|layer| write_layer(w, &mut e, layer));
+    let preview = preview.or(e.layers.first().map(|layer| layer.image))?;
     Some((e, preview))
 }
 
-/// What plain viewers show, under the materials.
-fn write_preview(w: &mut Writer, model: &Model, mut mean: Image<[f32; 3]>) -> Option<usize> {
-    material_layer::paint(&mut mean, &as_stored(&model.mesh), &model.materials);
-    Some(w.image(&base_layer(&mean, &FitOptions::default())?.coded, "preview".to_owned()))
+fn write_layer(w: &mut Writer, e: &mut Extension, layer: &Layer) {
+    let image = w.part_image(&layer.coded, format!("layer {}", e.layers.len()));
+    e.layers.push(LayerEntry { image, scale: layer.scale, offset: layer.offset });
+}
+
+/// What plain viewers show.
+fn write_preview(w: &mut Writer, model: &Model) -> Option<usize> {
+    Some(w.image(&base_layer(&model.still(), &FitOptions::default())?.coded, "preview".to_owned()))
 }
 
 /// The mesh as it will be read: so that a model that was read is written as it was.
-fn as_stored(mesh: &TexturedMesh) -> TexturedMesh {
+pub(crate) fn as_stored(mesh: &TexturedMesh) -> TexturedMesh {
     let mut stored = mesh.clone();
     let round = |v: &mut f64| *v = f64::from(*v as f32);
     stored.mesh.positions.iter_mut().for_each(|p| p.iter_mut().for_each(round));
@@ -283,29 +287,12 @@ fn write_materials(w: &mut Writer, model: &Model) -> Result<Vec<MaterialEntry>, 
     Ok(model.materials.iter().map(write).collect())
 }
 
-fn first_layer(layers: &Layers) -> Option<Image<[f32; 3]>> {
-    let layer = layers.layers.first()?;
-    Some(layer.texels.map(|texel| texel.map(|t| layer.offset + layer.scale * f32::from(t))))
-}
-
-fn mean_of_layers(layers: &Layers) -> Image<[f32; 3]> {
-    let size = (layers.facet_of_texel.width(), layers.facet_of_texel.height());
-    let mut mean = Image::filled(size.0, size.1, [0.0f32; 3]);
-    let share = 1.0 / layers.layers.len().max(1) as f32;
-    for layer in &layers.layers {
-        for (m, t) in mean.pixels_mut().iter_mut().zip(layer.texels.pixels()) {
-            m.iter_mut().zip(t).for_each(|(m, &t)| *m += share * f32::from(t));
-        }
-    }
-    mean
-}
-
-fn write_facets(w: &mut Writer, e: &mut Extension, facets: &[FacetWeights]) -> Option<()> {
-    let is_sound = |f: &FacetWeights| f.rank <= e.layers.len() && f.table.len() == f.rank * f.complex.sites().len();
+fn write_facets(w: &mut Writer, e: &mut Extension, facets: &[FacetWeights], layers: usize) -> Option<()> {
+    let is_sound = |f: &FacetWeights| f.rank <= layers && f.table.len() == f.rank * f.complex.sites().len();
     if !facets.iter().all(is_sound) {
         return None;
     }
-    let scales = coefficient_scales(facets, e.layers.len());
+    let scales = coefficient_scales(facets, layers);
     let (mut counts, mut centers, mut directions) = (Vec::new(), Vec::new(), Vec::new());
     let (mut triangles, mut edges, mut coefficients) = (Vec::new(), Vec::new(), Vec::new());
     for f in facets {
@@ -369,22 +356,17 @@ fn read_direction(stored: [f64; 3]) -> Vector3<f64> {
     Vector3::from(stored).try_normalize(0.5).unwrap_or_default()
 }
 
-fn write_lumigraph(
-    w: &mut Writer,
-    model: &Model,
-    rays: &Lumigraph,
-    surface: &SurfaceTexels,
-) -> Option<(Extension, usize)> {
+fn write_lumigraph(w: &mut Writer, model: &Model, rays: &Lumigraph) -> Option<(Extension, usize)> {
     let mut e = blank(model);
+    let preview = write_preview(w, model)?;
+    let centers: Vec<u8> =
+        rays.centers.iter().flat_map(|c| [c.x, c.y, c.z]).flat_map(|v| (v as f32).to_le_bytes()).collect();
+    e.camera_centers = w.part(&centers, FLOAT, "VEC3", rays.centers.len());
     for (k, pair) in rays.coded.chunks_exact(2).enumerate() {
         let color = w.part_image(&pair[0], format!("ray colours {k}"));
         let view = w.part_image(&pair[1], format!("ray views {k}"));
         e.rays.push(RayEntry { color, view });
     }
-    let centers: Vec<u8> =
-        rays.centers.iter().flat_map(|c| [c.x, c.y, c.z]).flat_map(|v| (v as f32).to_le_bytes()).collect();
-    e.camera_centers = w.part(&centers, FLOAT, "VEC3", rays.centers.len());
-    let preview = write_preview(w, model, rays.mean(surface))?;
     Some((e, preview))
 }
 
@@ -429,6 +411,13 @@ impl<'a> Reader<'a> {
         let length =
             length.ok_or_else(|| format!("accessor {index} counts more elements than its buffer view holds"))?;
         Ok((&bytes[..length], count))
+    }
+
+    /// Refuses a file whose data lie elsewhere: no address is followed, so none may be meant.
+    fn refuse_addresses(&self) -> Result<(), String> {
+        let mut parts = ["buffers", "images"].into_iter().filter_map(|kind| self.root[kind].as_array()).flatten();
+        let has_address = parts.any(|part| part.get("uri").is_some());
+        if has_address { Err("it names other files, which is not followed".to_owned()) } else { Ok(()) }
     }
 
     /// Refuses layers and materials that decode the same bytes again and again: a small file could ask for any memory.
@@ -497,6 +486,7 @@ pub(crate) fn read(bytes: &[u8]) -> Result<Model, String> {
     if !surface::is_atlas_size(e.atlas_size) {
         return Err(format!("an atlas of {:?} texels", e.atlas_size));
     }
+    reader.refuse_addresses()?;
     reader.refuse_shared_bytes(&e)?;
     let method: Method = e.method.parse()?;
     let mesh = read_mesh(&reader, e.atlas_size)?;

@@ -76,6 +76,25 @@ impl Layers {
         out
     }
 
+    /// The first layer.
+    pub(crate) fn first(&self) -> Image<[f32; 3]> {
+        let size = (self.facet_of_texel.width(), self.facet_of_texel.height());
+        let value = |layer: &Layer| layer.texels.map(|texel| texel.map(|t| layer.offset + layer.scale * f32::from(t)));
+        self.layers.first().map_or_else(|| Image::filled(size.0, size.1, [0.0; 3]), value)
+    }
+
+    /// The mean of the layers' texels.
+    pub(crate) fn mean(&self) -> Image<[f32; 3]> {
+        let mut mean = Image::filled(self.facet_of_texel.width(), self.facet_of_texel.height(), [0.0f32; 3]);
+        let share = 1.0 / self.layers.len().max(1) as f32;
+        for layer in &self.layers {
+            for (m, t) in mean.pixels_mut().iter_mut().zip(layer.texels.pixels()) {
+                m.iter_mut().zip(t).for_each(|(m, &t)| *m += share * f32::from(t));
+            }
+        }
+        mean
+    }
+
     fn blend_row(&self, y: usize, row: &mut [[f32; 3]], weights: &[Vec<f32>]) {
         let facets = self.facet_of_texel.row(y);
         let mut x = 0;

@@ -157,6 +157,18 @@ impl Model {
         }
     }
 
+    /// The texture that viewers without our extension show, in levels of 0..=255: the first layer of a static texture and
+    /// of DynTex, the mean of the layers of VDTM, of the rays of a lumigraph; under the materials.
+    pub fn still(&self) -> Image<[f32; 3]> {
+        let mut still = match &self.appearance {
+            Appearance::Layers(layers) if self.method == Method::Vdtm => layers.mean(),
+            Appearance::Layers(layers) => layers.first(),
+            Appearance::Lumigraph(rays, surface) => rays.mean(surface),
+        };
+        material_layer::paint(&mut still, &glb::as_stored(&self.mesh), &self.materials);
+        still
+    }
+
     /// Numbers the charts as the model's file does ([`charts_of_file`]). Tells how many there are.
     pub fn number_charts(&mut self) -> usize {
         self.mesh.face_charts = charts_of_file(&self.mesh.mesh.faces, self.mesh.mesh.positions.len());

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use turnlight::Selection;
 use turnlight::capture::Board;
 use turnlight::capture::board::{Dictionary, Paper, parse_length};
+use turnlight::export::web::AXES;
 use turnlight::swatch::Shape;
 use turnlight::texture::btf::{Budget, CodecKind, Precision};
 
@@ -56,6 +57,8 @@ pub(crate) enum Command {
     Compare(CompareArgs),
     /// Film a synthetic object, model it, compare the methods
     Demo(DemoArgs),
+    /// Write a model for the browser, or as a mesh with one picture
+    Export(ExportArgs),
     /// Make the visual hull alone (.ply .obj .glb)
     Hull(HullArgs),
     /// Bring a calibrated folder of any known kind into our own
@@ -70,6 +73,53 @@ pub(crate) enum Command {
     Synth(SynthArgs),
     /// Make a capture of stills on a turntable from one calibrated camera, the axis and the angles
     Turntable(TurntableArgs),
+    /// Show a model
+    View(ViewArgs),
+}
+
+/// What a model is exported to.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(crate) enum ExportTarget {
+    /// A folder with a player, for any static web server
+    Web,
+    /// Mesh, material and the static look (.obj .mtl .png)
+    Obj,
+}
+
+/// How a page shows a model.
+#[derive(Debug, Args)]
+pub(crate) struct PageArgs {
+    /// Axis that points up in the page: x, y, z, -x, -y, -z [default: that of the turntable, else z]
+    #[arg(long, value_name = "AXIS", value_parser = AXES, allow_hyphen_values = true, hide_possible_values = true)]
+    pub(crate) up: Option<String>,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct ExportArgs {
+    /// The model to export
+    pub(crate) model: PathBuf,
+    /// What to write
+    #[arg(long, value_enum)]
+    pub(crate) to: ExportTarget,
+    #[command(flatten)]
+    pub(crate) page: PageArgs,
+    /// The folder to write
+    #[arg(short, long, value_name = "DIR")]
+    pub(crate) output: PathBuf,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct ViewArgs {
+    /// The model to show
+    pub(crate) model: PathBuf,
+    /// Show it in a browser: serve it to this machine alone, and print the address
+    #[arg(long, required = true)]
+    pub(crate) web: bool,
+    #[command(flatten)]
+    pub(crate) page: PageArgs,
+    /// Port to serve on; 0 takes any free one
+    #[arg(long, value_name = "N", default_value = "0")]
+    pub(crate) port: u16,
 }
 
 /// What is done with bidirectional texture functions.

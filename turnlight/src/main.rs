@@ -57,6 +57,7 @@ fn run(cli: &Cli) -> Result<(), Error> {
         Command::Capture(args) => commands::capture::run(args, &progress),
         Command::Compare(args) => commands::compare::run(args, &progress),
         Command::Demo(args) => commands::demo::run(args, &progress),
+        Command::Export(args) => commands::export::run(args),
         Command::Hull(args) => commands::hull::run(args, &progress),
         Command::Import(args) => commands::import::run(args, &progress),
         Command::Info(args) => commands::info::run(args, &progress),
@@ -64,8 +65,17 @@ fn run(cli: &Cli) -> Result<(), Error> {
         Command::Render(args) => commands::render::run(args, &progress),
         Command::Synth(args) => commands::synth::run(args, &progress),
         Command::Turntable(args) => commands::turntable::run(args, &progress),
+        Command::View(args) => {
+            progress.finish();
+            return commands::view::run(args, |answer| say(cli, answer));
+        }
     }?;
     progress.finish();
+    say(cli, &answer)
+}
+
+/// Prints the answer as it was asked for.
+fn say(cli: &Cli, answer: &Answer) -> Result<(), Error> {
     if cli.general.json {
         print(&format!("{:#}", answer.json))
     } else if !cli.general.quiet {

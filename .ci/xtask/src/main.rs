@@ -1,7 +1,7 @@
 //! Chores, run as `cargo xtask demo`, `cargo xtask test` and `cargo xtask lint`.
 //!
 //! All bring what they need: system packages through `apt-get` where it exists, and for the tests a
-//! glTF validator and a Python environment below `target/tools`. What cannot be brought is said, and
+//! browser, and a glTF validator and a Python environment below `target/tools`. What cannot be brought is said, and
 //! the tests that wanted it skip, saying so.
 
 mod packages;

@@ -19,8 +19,10 @@ pub(crate) const OPENCV: Package =
     Package { probe: &["pkg-config", "--exists", "opencv4"], names: &["libopencv-dev", "pkg-config"] };
 /// Runs while the bindings are made; its headers come with it.
 pub(crate) const CLANG: Package = Package { probe: &["clang", "--version"], names: &["clang", "libclang-dev"] };
-/// Runs the glTF validator.
+/// Runs the glTF validator, and drives the browser.
 pub(crate) const NODE: Package = Package { probe: &["npm", "--version"], names: &["nodejs", "npm"] };
+/// Plays exported models.
+pub(crate) const CHROMIUM: Package = Package { probe: &["chromium", "--version"], names: &["chromium"] };
 /// Runs the referee.
 pub(crate) const PYTHON: Package =
     Package { probe: &["python3", "-c", "import ensurepip, venv"], names: &["python3", "python3-venv"] };

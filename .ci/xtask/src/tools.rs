@@ -1,4 +1,4 @@
-//! What the tests compare us with: the Khronos glTF validator, and Python for the referee.
+//! What the tests compare us with: the Khronos glTF validator, a browser, and Python for the referee.
 
 use crate::packages::{self, succeeds};
 use crate::run;
@@ -17,7 +17,10 @@ const MODULES: &str = "import numpy, PIL, skimage";
 /// cannot be had is named, and its tests skip.
 pub(crate) fn prepare(root: &Path) -> Vec<(&'static str, PathBuf)> {
     let tools = std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| root.join("target"), PathBuf::from).join("tools");
-    let mut found = vec![("TURNLIGHT_GLTF_VALIDATOR", "the glTF validator", validator(&tools))];
+    let mut found = vec![
+        ("TURNLIGHT_GLTF_VALIDATOR", "the glTF validator", validator(&tools)),
+        ("TURNLIGHT_CHROMIUM", "Chromium", chromium()),
+    ];
     // The referee is no part of the project: Python is wanted only where it lies beside it.
     if root.join(REFEREE).exists() {
         found.push(("TURNLIGHT_PYTHON", "Python with numpy, Pillow and scikit-image", python(&tools)));
@@ -44,6 +47,12 @@ fn validator(tools: &Path) -> Result<PathBuf> {
         run(npm.arg(VALIDATOR))?;
     }
     Ok(module)
+}
+
+/// A browser that needs no screen.
+fn chromium() -> Result<PathBuf> {
+    packages::ensure(&[packages::NODE, packages::CHROMIUM])?;
+    Ok("chromium".into())
 }
 
 /// A Python that can run the referee: the system's if it has the modules, else one of our own.

@@ -6,6 +6,7 @@ mod btf_render;
 pub(crate) mod capture;
 pub(crate) mod compare;
 pub(crate) mod demo;
+pub(crate) mod export;
 pub(crate) mod hull;
 pub(crate) mod import;
 pub(crate) mod info;
@@ -16,10 +17,12 @@ pub(crate) mod render;
 pub(crate) mod synth;
 mod synth_film;
 pub(crate) mod turntable;
+pub(crate) mod view;
 
-use crate::arguments::{CaptureArgs, FitArgs, MeshArgs, MethodArg, ShapeArgs};
+use crate::arguments::{CaptureArgs, FitArgs, MeshArgs, MethodArg, PageArgs, ShapeArgs};
 use std::path::Path;
 use turnlight::capture::{Capture, LoadOptions, MaskSource, View};
+use turnlight::export::web::Site;
 use turnlight::pipeline::ShapeOptions;
 use turnlight::stages::Stages;
 use turnlight::texture::{FitOptions, Method};
@@ -91,6 +94,17 @@ fn write_capture(capture: &Capture, output: &Path, stages: &mut Stages<'_>) -> R
     let views = stages.run("find silhouettes", |_| capture.load_all_views(&LoadOptions::default()))?;
     let mattes: Vec<_> = views.into_iter().map(|view| view.matte).collect();
     Ok(stages.run("write", |_| capture.write_with_mattes(&mattes, output))?)
+}
+
+impl PageArgs {
+    /// The player around a model's bytes.
+    fn site(&self, model: Vec<u8>) -> Site {
+        let site = Site::new(model);
+        match &self.up {
+            Some(axis) => site.with_up(axis),
+            None => site,
+        }
+    }
 }
 
 fn read_file(path: &Path) -> Result<Vec<u8>, Error> {

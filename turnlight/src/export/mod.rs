@@ -1,0 +1,7 @@
+//! Models for programs that do not know our extension, and for those that come without any.
+//!
+//! - [`web`]: a folder that any static server serves;
+//! - [`obj`]: a mesh with one baked picture.
+
+pub mod obj;
+pub mod web;
