@@ -5,10 +5,10 @@
 //! sample), and one scattered ray goes on to the next surface, where every light is asked for again. All
 //! lights share the paths, so what is left of noise looks the same under all of them.
 
-use capture::btf::DIRECTIONS;
 use super::tile::{Point, Tile};
 use crate::material::Vec3;
 use crate::sampler::{Sampler, pixel_seed};
+use capture::btf::DIRECTIONS;
 use rayon::prelude::*;
 
 /// Largest radiance by way of a second surface, under unit irradiance: three times a white surface.

@@ -7,11 +7,11 @@
 //!
 //! Pictures are 8-bit sRGB PNG, or 32-bit float OpenEXR: lossless both, the second without exposure.
 
-use capture::btf::{BtfDirection, DIRECTIONS};
 use super::material::BtfMaterial;
 use super::{BtfOptions, BtfStudio};
 use crate::error::{SynthError, io_error};
 use crate::film::encode;
+use capture::btf::{BtfDirection, DIRECTIONS};
 use image::{ExtendedColorType, ImageFormat};
 use rayon::prelude::*;
 use serde_json::{Value, json};
