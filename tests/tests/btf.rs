@@ -114,7 +114,7 @@ fn codecs_are_compared_on_one_page() {
     let names: Vec<&str> = runs.iter().filter_map(|run| run["name"].as_str()).collect();
     assert_eq!(names, ["pca", "pca", "ptm", "gmrf"]);
     assert!(runs.iter().all(|run| run["fault"].is_null() && run["rmse"].is_f64()), "{found}");
-    // Reached from below: never larger than asked.
+    // The file is never larger than asked.
     for run in &runs[..2] {
         assert!(run["ratio"].as_f64() >= run["ratio_asked"].as_f64(), "{run}");
     }

@@ -98,8 +98,9 @@ fn a_film_of_a_turntable_becomes_a_capture() {
     // A flat board at one height tells the focal length to so much only.
     assert!(focal.parameter == LensParameter::Focal && focal.deviation < 0.01 * lens.fx, "{focal:?}");
     assert!((lens.fx - cartoon.lens().fx).abs() < 3.0 * focal.deviation, "{focal:?}");
-    // Balls of ninety and sixty pixels: half a pixel of rim, in the mean, is a fortieth of them; none of it one-sided.
-    assert!(mean > 0.97 && (extra - missing).abs() < 0.01, "{mean} {extra} {missing}");
+    // Balls of ninety and sixty pixels: half a pixel of rim, in the mean, is a fortieth of them. It leans outward by a
+    // third of a pixel, since cuts decide what belongs to the object.
+    assert!(mean > 0.975 && (extra - missing).abs() < 0.02, "{mean} {extra} {missing}");
     // One turn is kept, what is beyond shows it again.
     assert!((40..=46).contains(&found.kept.len()), "{}", found.kept.len());
 }

@@ -112,7 +112,7 @@ pub enum Budget {
     /// What the codec's authors used.
     #[default]
     Standard,
-    /// Raw bytes over coded bytes, everything counted; reached within a few per cent from below.
+    /// Raw bytes over coded bytes, everything counted: at least this, by as few per cent more as the codec can.
     Ratio(f64),
     /// 0 (small) to 100 (faithful).
     Quality(f64),

@@ -79,8 +79,10 @@ const BATCH: usize = 4 * BLOCK;
 const SMALL_TILE: usize = 3200;
 /// Rounds of the search for a threshold.
 const ROUNDS: usize = 12;
-/// A ratio is met within this share, from below.
+/// A ratio may be exceeded by this share.
 const RATIO_TOLERANCE: f64 = 0.03;
+/// Beyond any logarithm of a ratio of sizes.
+const OVER_BUDGET: f64 = 1e3;
 /// The first threshold tried.
 const FIRST_THRESHOLD: f64 = 16.0;
 /// Thresholds searched, in levels or in hundredths of `1 − SSIM`.
@@ -132,7 +134,8 @@ pub fn fit_shared(btfs: &[Btf], options: &Options) -> Result<(MultilevelVq, FitR
             let raw: u64 = btfs.iter().map(Btf::raw_bytes).sum();
             // Searched are values that fall with the threshold.
             let bytes = |codec: &MultilevelVq| byte_count(first, codec) as f64;
-            let range = [raw as f64 / ratio, raw as f64 / ratio / (1.0 - RATIO_TOLERANCE)];
+            let most = raw as f64 / ratio;
+            let range = [most / (1.0 + RATIO_TOLERANCE), most];
             search_threshold(range, bytes, |t| fit_threshold(first, &inputs, options, t), &mut report)
         }
         Aim::Entries(count) => {
@@ -246,7 +249,9 @@ fn search_threshold(
     fit: impl Fn(f64) -> MultilevelVq,
     report: &mut FitReport,
 ) -> MultilevelVq {
-    let distance = |found: f64| (found / high).ln().max((low / found).ln()).max(0.0);
+    // Too small is allowed, too large only where nothing is small enough.
+    let distance =
+        |found: f64| if found > high { OVER_BUDGET + (found / high).ln() } else { (low / found).ln().max(0.0) };
     let mut best = fit(FIRST_THRESHOLD);
     let mut nearest = size(&best);
     report.objective.push(nearest);

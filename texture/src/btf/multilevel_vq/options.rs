@@ -45,9 +45,9 @@ pub struct Options {
 pub enum Aim {
     /// The error under which a texel is taken for another: RMSE in 0..255 levels, or `1 − SSIM` in hundredths.
     Threshold(f64),
-    /// Raw over coded bytes, met within 3 % from below.
+    /// Raw over coded bytes, at least this and at most 3 % more where a threshold gives it.
     Ratio(f64),
-    /// Items of P4, met within 10 % from below.
+    /// Items of P4 at most, and nine tenths of it where a threshold gives it.
     Entries(usize),
 }
 
