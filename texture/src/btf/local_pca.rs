@@ -105,13 +105,38 @@ pub fn fit(btf: &Btf, options: &Options) -> Result<(LocalPca, FitReport), Textur
     let sketch = sketch(&data, options.seed);
     let bytes = |ratio| bytes_for(ratio, btf).saturating_sub(texels * 2);
     let target = Target::of(options.budget, STANDARD_COMPONENTS, bytes);
-    let clusters = match target {
+    let candidates = match target {
         Target::Bytes(bytes) => best_clusters(&sketch, bytes, length, options.seed),
-        Target::Each(components) => cluster(&sketch, STANDARD_CLUSTERS, components.min(SKETCH / 2), options.seed),
-        Target::Error(_) | Target::Supported => cluster(&sketch, STANDARD_CLUSTERS, STANDARD_COMPONENTS, options.seed),
+        Target::Each(components) => vec![cluster(&sketch, STANDARD_CLUSTERS, components.min(SKETCH / 2), options.seed)],
+        Target::Error(_) | Target::Supported => {
+            vec![cluster(&sketch, STANDARD_CLUSTERS, STANDARD_COMPONENTS, options.seed)]
+        }
     };
+    let coded = candidates.iter().map(|clusters| code(&data, clusters, target, options));
+    let left = |coded: &Coded| coded.objective.last().copied().unwrap_or(0.0);
+    let best = coded.reduce(|a, b| if left(&b) < left(&a) { b } else { a });
+    let Some(Coded { members, models, objective, mut notes }) = best else {
+        return Err(TextureError::Degenerate {
+            fault: "there are no texels".into(),
+            remedy: "give at least one".into(),
+        });
+    };
+    notes.push(format!("{} clusters", members.len()));
+    Ok((LocalPca { frame, places: places_of(&members, texels), models }, FitReport { objective, notes }))
+}
+
+/// Clusters as they are stored.
+struct Coded {
+    members: Vec<Vec<usize>>,
+    models: Vec<LinearModel>,
+    objective: Vec<f64>,
+    notes: Vec<String>,
+}
+
+/// Components of each cluster, as many as the target allows.
+fn code(data: &DMatrix<f32>, clusters: &Clusters, target: Target, options: &Options) -> Coded {
+    let (length, texels) = data.shape();
     let members = members_of(&clusters.labels);
-    let places = places_of(&members, texels);
     let target = match target {
         Target::Bytes(bytes) => Target::Bytes((bytes + 2 * texels).saturating_sub(side_bytes(texels, members.len()))),
         other => other,
@@ -121,10 +146,10 @@ pub fn fit(btf: &Btf, options: &Options) -> Result<(LocalPca, FitReport), Textur
         Source::new(data.select_columns(texels), most, options.seed)
     };
     let sources: Vec<Source> = members.iter().map(source).collect();
-    let mut notes = vec![format!("{} clusters", members.len())];
+    let mut notes = Vec::new();
     let models = linear::fit(&sources, target, options.precision, &mut notes);
     let objective = linear::objective(&sources, &models);
-    Ok((LocalPca { frame, places, models }, FitReport { objective, notes }))
+    Coded { members, models, objective, notes }
 }
 
 /// Bytes of c clusters of k components and a mean as the literature counts them: each number in `number_bytes`, and a
@@ -260,22 +285,22 @@ fn nearest_seeds(points: &DMatrix<f32>, clusters: usize, seed: u64) -> Vec<usize
     labels
 }
 
-/// The number of clusters, of those tried, that leaves the least for as many bytes.
-fn best_clusters(points: &DMatrix<f32>, bytes: usize, length: usize, seed: u64) -> Clusters {
+/// The numbers of clusters, of those tried, that leave the least for as many bytes: the two best, for their bytes are
+/// estimated here.
+fn best_clusters(points: &DMatrix<f32>, bytes: usize, length: usize, seed: u64) -> Vec<Clusters> {
     let texels = points.ncols();
-    let mut best: Option<Clusters> = None;
+    let mut found = Vec::new();
     for clusters in TRIED.into_iter().filter(|&c| c <= texels) {
         let per_component = (clusters * length + texels) * TYPICAL_BITS / 8;
         let components = (bytes / per_component.max(1)).saturating_sub(1).min(SKETCH / 2);
         if clusters > 1 && bytes < per_component {
             break;
         }
-        let found = cluster(points, clusters, components, seed);
-        if best.as_ref().is_none_or(|b| found.error < b.error) {
-            best = Some(found);
-        }
+        found.push(cluster(points, clusters, components, seed));
     }
-    best.unwrap_or(Clusters { labels: vec![0; texels], error: 0.0 })
+    found.sort_by(|a, b| a.error.total_cmp(&b.error));
+    found.truncate(2);
+    found
 }
 
 /// Members of each cluster that has some, ascending.
