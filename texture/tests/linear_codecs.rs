@@ -296,3 +296,12 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn a_name_of_many_letters_is_cut_between_two_of_them() {
+    let mut btf = stripes();
+    btf.name = "é".repeat(150);
+    let material = coded(&btf, CodecKind::Ptm, Budget::Standard, Precision::Compact);
+    let back = Material::from_bytes(&material.to_bytes().0).unwrap();
+    assert!(btf.name.starts_with(&back.name) && back.name.len() == 254);
+}

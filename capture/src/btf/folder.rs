@@ -6,8 +6,8 @@
 //! ```
 //!
 //! Angles are read from the names, never from the position. `btf.json` beside them, which
-//! `turnlight btf synth` writes, says encoding and exposure; without it, 8-bit pictures are sRGB and
-//! others linear. A pair without a picture is filled from the nearest light of its view, or else from the
+//! `turnlight btf synth` writes, says encoding and exposure; without it, EXR pictures are linear and
+//! all others sRGB. A pair without a picture is filled from the nearest light of its view, or else from the
 //! nearest view under its light.
 
 use super::pictures::{is_deep, read_pictures};
@@ -97,9 +97,12 @@ fn angles(path: &Path) -> Option<[u16; 4]> {
     }
     let stem = path.file_stem()?.to_str()?;
     let after = |tag: &str| {
-        let digits = &stem[stem.find(tag)? + tag.len()..];
-        let end = digits.find(|c: char| !c.is_ascii_digit()).unwrap_or(digits.len());
-        digits[..end].parse::<u16>().ok()
+        // The letters may stand in a name too, without digits after them.
+        stem.match_indices(tag).find_map(|(at, _)| {
+            let digits = &stem[at + tag.len()..];
+            let end = digits.find(|c: char| !c.is_ascii_digit()).unwrap_or(digits.len());
+            digits[..end].parse::<u16>().ok()
+        })
     };
     let [tv, pv, tl, pl] = [after("tv")?, after("pv")?, after("tl")?, after("pl")?];
     (tv <= 90 && tl <= 90).then_some([tv, pv % 360, tl, pl % 360])

@@ -6,7 +6,7 @@
 //! jpg/lion_0001.jpg x y z    file, direction of the light: x right, y up, z towards the camera
 //! ```
 
-use super::pictures::read_pictures;
+use super::pictures::{is_deep, read_pictures};
 use super::{Btf, Encoding};
 use crate::CaptureError;
 use nalgebra::Vector3;
@@ -22,6 +22,7 @@ pub fn read_light_stack(list: &Path, crop: Option<usize>) -> Result<Btf, Capture
     let entries = parse(list, &text)?;
     let folder = list.parent().unwrap_or(Path::new("."));
     let paths: Vec<Option<PathBuf>> = entries.iter().map(|(name, _)| Some(folder.join(name))).collect();
+    let entries_are_deep = paths.iter().flatten().next().is_some_and(|path| is_deep(path));
     let name = list.file_stem().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
     let mut btf = Btf {
         name,
@@ -29,7 +30,7 @@ pub fn read_light_stack(list: &Path, crop: Option<usize>) -> Result<Btf, Capture
         lights: entries.into_iter().map(|(_, light)| light).collect(),
         width: 0,
         height: 0,
-        encoding: Encoding::Srgb,
+        encoding: if entries_are_deep { Encoding::Linear } else { Encoding::Srgb },
         exposure: 1.0,
         includes_cosine: true,
         texel_pitch_mm: None,
@@ -53,12 +54,14 @@ fn parse(list: &Path, text: &str) -> Result<Vec<(String, Vector3<f64>)>, Capture
     let count = count.ok_or_else(|| fault(0, "no number of pictures"))?;
     let mut entries = Vec::new();
     for (at, line) in lines {
-        // Names may hold blanks: the numbers are the last three.
-        let mut words = line.trim().rsplitn(4, char::is_whitespace);
-        let mut number = || words.next().and_then(|word| word.parse::<f64>().ok()).filter(|n| n.is_finite());
-        let (z, y, x) = (number(), number(), number());
-        let name = words.next().map(str::trim).filter(|name| !name.is_empty());
-        let (Some(x), Some(y), Some(z), Some(name)) = (x, y, z, name) else {
+        // Names may hold blanks: the numbers are the last three words.
+        let mut name = line.trim();
+        let mut number = || {
+            let (before, word) = name.rsplit_once(char::is_whitespace)?;
+            name = before.trim_end();
+            word.parse::<f64>().ok().filter(|n| n.is_finite())
+        };
+        let (Some(z), Some(y), Some(x)) = (number(), number(), number()) else {
             return Err(fault(at, "no name with three numbers"));
         };
         let light = Vector3::new(x, y, z).try_normalize(1e-9).filter(|light| light.z >= 0.0);

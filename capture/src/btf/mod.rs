@@ -180,7 +180,8 @@ impl Btf {
     }
 
     /// Checks that the numbers fit one another, and fills what is not finite from the nearest light under
-    /// which the texel is, or by 0 where there is none. Tells how many samples were filled.
+    /// which the texel is, or by 0 where there is none. Pictures with nothing finite count as not measured.
+    /// Tells how many samples were filled.
     ///
     /// # Errors
     /// Where lists are empty, lengths disagree or a direction is not a unit vector.
@@ -212,7 +213,21 @@ impl Btf {
         Ok(self.fill())
     }
 
+    /// Pictures without a finite sample were not measured.
+    fn mark_empty(&mut self) {
+        let length = 3 * self.texels();
+        let empty: Vec<bool> = self.samples.par_chunks(length).map(|p| p.iter().all(|s| !s.is_finite())).collect();
+        if empty.contains(&true) {
+            self.measured =
+                (0..empty.len()).map(|p| !empty[p] && self.measured.get(p).copied().unwrap_or(true)).collect();
+        }
+    }
+
     fn fill(&mut self) -> usize {
+        if self.samples.par_iter().all(|s| s.is_finite()) {
+            return 0;
+        }
+        self.mark_empty();
         let (lights, length) = (self.lights.len(), 3 * self.width * self.height);
         let order: Vec<Vec<usize>> = self.lights.iter().map(|l| nearest_first(l, &self.lights)).collect();
         let fill_view = |view: &mut [f32]| {

@@ -67,7 +67,8 @@ fn read_picture(path: &Path, crop: Option<usize>) -> Result<(Vec<f32>, [usize; 2
     let picture = image::ImageReader::open(path).map_err(|e| CaptureError::io(path, e))?;
     let picture = picture.with_guessed_format().map_err(|e| CaptureError::io(path, e))?.decode().map_err(unreadable)?;
     let (width, height) = picture.dimensions();
-    let [cut_width, cut_height] = [width, height].map(|n| crop.map_or(n, |crop| n.min(crop.max(1) as u32)));
+    let [cut_width, cut_height] =
+        [width, height].map(|n| crop.map_or(n, |crop| n.min(u32::try_from(crop.max(1)).unwrap_or(u32::MAX))));
     let picture = picture.crop_imm((width - cut_width) / 2, (height - cut_height) / 2, cut_width, cut_height);
     Ok((picture.into_rgb32f().into_raw(), [cut_width as usize, cut_height as usize]))
 }

@@ -81,7 +81,7 @@ fn two_pictures_of_one_pair_are_refused() {
 fn a_list_of_lights_names_its_pictures() {
     let folder = folder(&[("lion 1.png", 51), ("lion 2.png", 255)]);
     let list = folder.path().join("dirs.lp");
-    std::fs::write(&list, "2\r\nlion 1.png 0 0 2\r\nlion 2.png 3 0 4\r\n").unwrap();
+    std::fs::write(&list, "2\r\nlion 1.png  0 0\t2\r\nlion 2.png 3   0 4\r\n").unwrap();
     let btf = read(folder.path(), Some(1)).unwrap();
     assert_eq!((btf.views.len(), btf.width, btf.height), (1, 1, 1));
     assert!((btf.lights[1] - Vector3::new(0.6, 0.0, 0.8)).norm() < 1e-12);
@@ -99,4 +99,20 @@ fn what_is_no_material_is_named() {
     let file = tempfile::Builder::new().suffix(".txt").tempfile().unwrap();
     assert!(read(file.path(), None).unwrap_err().to_string().contains("no measured material"));
     assert!(read("nowhere.btf".as_ref(), None).is_err());
+}
+
+#[test]
+fn pictures_with_nothing_in_them_count_as_not_measured() {
+    let mut btf = ramp(3);
+    btf.samples[12..24].fill(f32::NAN);
+    btf.samples[0] = f32::NAN;
+    assert_eq!(btf.check().unwrap(), 13);
+    assert_eq!([0, 1, 2].map(|light| btf.is_measured(0, light)), [true, false, true]);
+}
+
+#[test]
+fn letters_of_a_name_are_no_angles() {
+    let folder =
+        folder(&[("bottle sample tl030 pl000 tv000 pv000.png", 9), ("bottle sample tl000 pl000 tv000 pv000.png", 9)]);
+    assert_eq!(read(folder.path(), None).unwrap().lights.len(), 2);
 }

@@ -30,8 +30,11 @@ const MAGIC: &[u8; 8] = b"\x89TLBTF\r\n";
 const VERSION: u16 = 1;
 /// Where the checksum stands.
 const CHECKSUM_AT: usize = 11;
-/// Largest tile of a file, texels a side.
+/// Largest tile of a file: some codecs keep nothing per texel, so that its bytes do not bound it.
 const MAX_SIDE: usize = 1 << 14;
+const MAX_TEXELS: usize = 1 << 22;
+/// Most pairs of view and light, for the same reason.
+const MAX_PAIRS: usize = 1 << 20;
 
 /// What is wrong with a file's content.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -333,11 +336,28 @@ pub(super) fn header_bytes(btf: &Btf) -> usize {
     let mut out = Writer::default();
     [&btf.views, &btf.lights].into_iter().for_each(|list| write_directions(list, &mut out));
     let range = if matches!(btf.encoding, Encoding::Log { .. }) { 8 } else { 0 };
-    MAGIC.len() + 37 + btf.name.len().min(255) + range + out.bytes.len()
+    // Fields of fixed size after the magic, then name, range and directions.
+    MAGIC.len() + 30 + stored_name(&btf.name).len() + range + out.bytes.len()
+}
+
+/// As much of a name as a file holds.
+fn stored_name(name: &str) -> &str {
+    let end = (0..=name.len().min(255)).rev().find(|&i| name.is_char_boundary(i)).unwrap_or(0);
+    &name[..end]
+}
+
+/// Says what of a grid no file can hold.
+pub(super) fn unstorable(width: usize, height: usize, views: usize, lights: usize) -> Option<String> {
+    if !(1..=MAX_SIDE).contains(&width) || !(1..=MAX_SIDE).contains(&height) || width * height > MAX_TEXELS {
+        return Some(format!("a tile of {width} × {height} texels"));
+    }
+    let few = |count: usize| (1..=usize::from(u16::MAX)).contains(&count);
+    let fits = few(views) && few(lights) && views * lights <= MAX_PAIRS;
+    (!fits).then(|| format!("{views} views and {lights} lights"))
 }
 
 fn write_header(material: &Material, frame: &Frame, out: &mut Writer) {
-    let name = material.name.get(..255).unwrap_or(&material.name).as_bytes();
+    let name = stored_name(&material.name).as_bytes();
     out.u8(name.len() as u8);
     out.bytes(name);
     match material.encoding {
@@ -386,11 +406,11 @@ fn read_header(from: &mut Reader<'_>) -> Result<(impl FnOnce(Codec) -> Material 
     let texel_pitch_mm = Some(from.f32()?).filter(|pitch| *pitch > 0.0);
     let raw_bytes = from.u64()?;
     let (width, height) = (usize::from(from.u16()?), usize::from(from.u16()?));
-    if !(1..=MAX_SIDE).contains(&width) || !(1..=MAX_SIDE).contains(&height) {
-        return Err(Fault(format!("a tile of {width} × {height} texels")));
-    }
     let views = Arc::new(read_directions(from)?);
     let lights = Arc::new(read_directions(from)?);
+    if let Some(fault) = unstorable(width, height, views.len(), lights.len()) {
+        return Err(Fault(fault));
+    }
     let header = move |codec| Material { name, encoding, exposure, includes_cosine, texel_pitch_mm, raw_bytes, codec };
     Ok((header, Frame { width, height, views, lights }))
 }

@@ -219,7 +219,7 @@ fn cluster(points: &DMatrix<f32>, clusters: usize, components: usize, seed: u64)
 
 fn cluster_once(points: &DMatrix<f32>, clusters: usize, components: usize, seed: u64) -> Clusters {
     let mut labels = nearest_seeds(points, clusters, seed);
-    let mut error = f64::INFINITY;
+    let mut best = Clusters { labels: labels.clone(), error: f64::INFINITY };
     for _ in 0..ROUNDS {
         let members = members_of(&labels);
         let spaces: Vec<Subspace> = members.par_iter().map(|m| Subspace::of(points, m, components)).collect();
@@ -227,14 +227,16 @@ fn cluster_once(points: &DMatrix<f32>, clusters: usize, components: usize, seed:
             (0..points.ncols()).into_par_iter().map(|t| least(&spaces, points.column(t).as_slice())).collect();
         let now: f64 = assigned.iter().map(|a| a.1).sum();
         labels = assigned.iter().map(|a| a.0).collect();
-        let settled = now >= error * (1.0 - SETTLED);
-        error = error.min(now);
+        let settled = now >= best.error * (1.0 - SETTLED);
+        if now < best.error {
+            best = Clusters { labels: labels.clone(), error: now };
+        }
         if settled {
             break;
         }
         seed_empty(&mut labels, &assigned, clusters);
     }
-    Clusters { labels, error }
+    best
 }
 
 /// The subspace that leaves the least of a point.

@@ -292,6 +292,10 @@ impl Codec {
 /// # Errors
 /// Where the data cannot carry the codec, or an option is out of range.
 pub fn fit(btf: Btf, options: &FitOptions) -> Result<(Material, FitReport), TextureError> {
+    if let Some(fault) = container::unstorable(btf.width, btf.height, btf.views.len(), btf.lights.len()) {
+        let remedy = "cut out a smaller part, 2048 × 2048 texels and 1024 × 1024 directions at most".to_owned();
+        return Err(TextureError::Degenerate { fault: format!("no file holds {fault}"), remedy });
+    }
     let raw_bytes = btf.raw_bytes();
     let btf = to_coded_range(btf);
     let (codec, report) = fit_codec(&btf, options)?;
@@ -368,7 +372,7 @@ fn fit_codec(btf: &Btf, options: &FitOptions) -> Result<(Codec, FitReport), Text
 }
 
 impl CodecKind {
-    /// Whether its size can be chosen; otherwise its authors fixed it.
+    /// Whether it is compared at several sizes; the others have one that matters, the authors'.
     pub fn has_sizes(self) -> bool {
         !matches!(self, Self::Ptm | Self::Lafortune | Self::Gmrf | Self::Car2d | Self::Car3d)
     }

@@ -91,11 +91,13 @@ pub(super) fn judge(material: &Material, btf: &Btf, seed: u64) -> Evaluation {
 /// How alike pictures are that need not agree texel by texel, over pairs spread evenly.
 fn statistics(btf: &Btf, drawn: &Synthesized<'_>) -> TextureStatistics {
     let (lights, size) = (btf.lights.len(), [btf.width, btf.height]);
+    let pairs = (0..btf.pairs()).map(|pair| (pair / lights, pair % lights));
+    let measured: Vec<(usize, usize)> = pairs.filter(|&(view, light)| btf.is_measured(view, light)).collect();
+    let count = JUDGED.min(measured.len());
     let of = |i: usize| {
-        let pair = i * btf.pairs() / JUDGED.min(btf.pairs());
-        let (view, light) = (pair / lights, pair % lights);
+        let (view, light) = measured[i * measured.len() / count];
         let picture = drawn.picture(&btf.lights[light].cast(), &btf.views[view].cast());
         compare(btf.picture(view, light), size, &picture, size)
     };
-    TextureStatistics::mean(&(0..JUDGED.min(btf.pairs())).map(of).collect::<Vec<_>>())
+    TextureStatistics::mean(&(0..count).map(of).collect::<Vec<_>>())
 }

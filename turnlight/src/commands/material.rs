@@ -34,7 +34,7 @@ fn layer(
 ) -> Result<MaterialLayer, Error> {
     let charts = arg.charts.positions(count).map_err(|fault| {
         let last = count.saturating_sub(1);
-        Error::Arguments(format!("--material: the model has charts 0 to {last}, taken for views here: {fault}"))
+        Error::Arguments(format!("--material: the model has charts 0 to {last}; of the list of charts: {fault}"))
     })?;
     let charts = charts.into_iter().map(|chart| chart as u32).collect();
     let coded = read_file(&arg.file)?;
@@ -46,7 +46,8 @@ fn layer(
     let mut layer = MaterialLayer::new(charts, arg.tile_size.unwrap_or(1.0), coded).map_err(invalid)?;
     if arg.tile_size.is_none() {
         layer.tile_size = measured_size(&layer, unit).unwrap_or_else(|| {
-            let side = model.mesh.mesh.aabb().map_or(1.0, |aabb| aabb.size().max()) / TILES;
+            let longest = model.mesh.mesh.aabb().map(|aabb| aabb.size().max()).filter(|side| *side > 0.0);
+            let side = longest.unwrap_or(1.0) / TILES;
             let path = arg.file.display();
             observer.noted(&format!("{path}: a tile measures {side:.4} world units, for nothing tells; say @SIZE"));
             side

@@ -34,6 +34,8 @@ use std::path::Path;
 
 /// Keeps logarithms of black finite.
 const OFFSET: f32 = 1e-5;
+/// Most views, and lights of a view: Bonn measured 151.
+const MAX_DIRECTIONS: usize = 4096;
 /// Logarithm of luminance, and chrominance over it.
 const LOG_YUV: usize = 11;
 
@@ -163,10 +165,16 @@ fn header(from: &mut Cursor<'_>) -> Result<(bool, Option<f64>), Fault> {
 /// Views and lights.
 fn directions(from: &mut Cursor<'_>) -> Result<[Vec<Vector3<f64>>; 2], Fault> {
     let count = from.u32()?;
+    if count > MAX_DIRECTIONS {
+        return fault(format!("it has {count} views"));
+    }
     let (mut views, mut lights) = (Vec::new(), Vec::new());
     for view in 0..count {
         views.push(from.direction()?);
         let count = from.u32()?;
+        if count > MAX_DIRECTIONS {
+            return fault(format!("view {view} has {count} lights"));
+        }
         from.expect(count, 8)?;
         let of_view: Vec<Vector3<f64>> = (0..count).map(|_| from.direction()).collect::<Result<_, _>>()?;
         if view > 0 && of_view != lights {
@@ -318,6 +326,9 @@ impl<'a> Cursor<'a> {
         let (k, file_rows, columns) = (self.u32()?, self.u32()?, self.u32()?);
         if file_rows != rows || columns != window.file_width * window.file_height {
             return fault(format!("a factorisation of {file_rows} × {columns}"));
+        }
+        if k == 0 {
+            return fault("a factorisation without components");
         }
         self.skip(k, size)?;
         self.expect(rows.saturating_mul(k), size)?;

@@ -78,6 +78,15 @@ fn grey_in_logarithmic_yuv_is_grey() {
     assert!(rgb.iter().all(|c| (c - 0.5).abs() < 5e-5), "{rgb:?}");
 }
 
+#[test]
+fn a_factorisation_without_components_asks_for_no_memory() {
+    let mut bytes = file(4, 0);
+    // K of the first channel: after the mean and the transform, and the size of its numbers.
+    let at = bytes.len() - 3 * (1 + 12 + 4 * (2 + 2 * VIEWS * LIGHTS + 2 * WIDTH * HEIGHT)) + 1;
+    bytes[at..at + 4].fill(0);
+    assert!(parsed(&bytes, None).unwrap_err().contains("without components"));
+}
+
 proptest! {
     #[test]
     fn damaged_files_are_refused_or_read_but_never_fatal(at in 0usize..1024, value: u8, cut in 0usize..1024) {

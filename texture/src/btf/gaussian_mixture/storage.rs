@@ -67,11 +67,7 @@ pub(super) fn component_bytes(precision: Precision) -> usize {
 
 /// Bytes of a file without its components: the container's header and directions, and the mean picture.
 pub(super) fn other_bytes(btf: &capture::btf::Btf) -> usize {
-    let bonn = capture::btf::bonn_directions();
-    let list = |all: &[nalgebra::Vector3<f64>]| if all == bonn { 2 } else { 2 + 8 * all.len() };
-    let log = if matches!(btf.encoding, capture::btf::Encoding::Srgb) { 0 } else { 8 };
-    let header = 8 + 2 + 1 + 4 + 1 + btf.name.len().min(255) + 1 + log + 4 + 1 + 4 + 8 + 4;
-    header + list(&btf.views) + list(&btf.lights) + 1 + 4 + 3 * btf.pairs()
+    crate::btf::container::header_bytes(btf) + 1 + 4 + 3 * btf.pairs()
 }
 
 /// Codes evenly spaced between two values.

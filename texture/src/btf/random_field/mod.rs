@@ -52,7 +52,7 @@ use super::frame::Blend;
 use super::{Budget, FitReport, Frame, Precision};
 use crate::TextureError;
 use autoregression::Covariances;
-use capture::btf::{Btf, bonn_directions};
+use capture::btf::Btf;
 use clusters::{Clusters, Description};
 use fourier::{Fourier, Wave, frequency};
 use moments::{Moments, TONES};
@@ -269,7 +269,7 @@ fn fit_ratio<M: FieldModel>(
     ratio: f64,
     report: &mut FitReport,
 ) -> RandomField<M> {
-    let budget = btf.raw_bytes() as f64 / ratio - header_bytes(btf) as f64;
+    let budget = btf.raw_bytes() as f64 / ratio - super::container::header_bytes(btf) as f64;
     let mut best: Option<RandomField<M>> = None;
     let mut count = STANDARD_GROUPS;
     let mut tried = Vec::new();
@@ -295,20 +295,12 @@ fn fit_ratio<M: FieldModel>(
         let smallest = Options { moment_rank: 1, ..*options };
         fit_groups(btf, prepared, &smallest, 1, report)
     });
-    let reached = btf.raw_bytes() as f64 / (field.byte_counts().0 + header_bytes(btf)) as f64;
+    let reached = btf.raw_bytes() as f64 / (field.byte_counts().0 + super::container::header_bytes(btf)) as f64;
     report.notes.push(format!("{} groups, {} singular pairs of moments", field.looks.len(), field.moments.rank()));
     if !(0.95..1.5).contains(&(reached / ratio)) {
         report.notes.push(format!("a ratio of {ratio} was asked for, the nearest these models have is {reached:.1}"));
     }
     field
-}
-
-/// Bytes of a material's file before those of its codec.
-fn header_bytes(btf: &Btf) -> usize {
-    let directions = |list: &[Vector3<f64>]| if list == bonn_directions() { 2 } else { 2 + 8 * list.len() };
-    let encoding = if matches!(btf.encoding, capture::btf::Encoding::Log { .. }) { 9 } else { 1 };
-    let name = btf.name.get(..255).unwrap_or(&btf.name).len();
-    15 + 1 + name + encoding + 4 + 1 + 4 + 8 + 4 + directions(&btf.views) + directions(&btf.lights)
 }
 
 /// Estimates what a group's pictures have in common.

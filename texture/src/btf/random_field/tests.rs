@@ -331,7 +331,7 @@ fn survives<C: Stored + Synthesizer>(bytes: &[u8], frame: &Frame) {
 /// A material of each kind, and the bytes of its header.
 static WHOLE: LazyLock<[(Material, usize); 3]> = LazyLock::new(|| {
     let btf = striped();
-    KINDS.map(|kind| (fitted(&btf, kind, Budget::Components(2)).0, header_bytes(&btf)))
+    KINDS.map(|kind| (fitted(&btf, kind, Budget::Components(2)).0, crate::btf::container::header_bytes(&btf)))
 });
 
 proptest! {
