@@ -63,6 +63,7 @@ fn every_codec_fits_and_is_judged_by_the_contract() {
             assert!(figure("psnr_db") > 14.0, "{codec}: {found}");
             assert!(figure("evals_per_s_core") > 1e3 && figure("evals_per_s_all") > 1e3, "{codec}");
         }
+        assert_eq!(found["samples_per_s_core"].is_f64(), codec == "multilevel-vq");
         assert!(place.path().join("sheet.png").is_file());
     }
 }

@@ -1,12 +1,12 @@
 //! One material against the data it was fitted to.
 
-use super::speed::{Speed, speed};
+use super::speed::{Speed, draws, speed};
 use crate::Error;
 use crate::stages::peak_bytes;
 use capture::btf::Btf;
 use serde::Serialize;
 use texture::btf::statistics::{TextureStatistics, compare};
-use texture::btf::{Answer, Material, Part, Sampler, Score, Synthesized, score, to_coded_range};
+use texture::btf::{Answer, Codec, Material, Part, Sampler, Score, Synthesized, score, to_coded_range};
 
 /// Pictures whose statistics are compared.
 const JUDGED: usize = 64;
@@ -32,6 +32,8 @@ pub struct Evaluation {
     /// Answers per second; of codecs that are asked sample by sample.
     #[serde(flatten)]
     pub speed: Option<Speed>,
+    /// Directions of light drawn per second on one core, where the codec draws them.
+    pub samples_per_s_core: Option<f64>,
     /// Of the fit, where it was timed.
     pub fit_s: Option<f64>,
     /// The most memory the process has held.
@@ -83,6 +85,10 @@ pub(super) fn judge(material: &Material, btf: &Btf, seed: u64) -> Evaluation {
         score,
         statistics,
         speed,
+        samples_per_s_core: match &material.codec {
+            Codec::MultilevelVq(codec) => Some(draws(codec, seed)),
+            _ => None,
+        },
         fit_s: None,
         peak_bytes: peak_bytes(),
     }

@@ -8,6 +8,7 @@ use serde::Serialize;
 use std::hint::black_box;
 use std::time::{Duration, Instant};
 use texture::btf::Sampler;
+use texture::btf::multilevel_vq::MultilevelVq;
 
 /// Questions drawn once and asked over and over: more than the first caches hold.
 const QUESTIONS: usize = 1 << 16;
@@ -60,6 +61,19 @@ pub fn speed(sampler: &dyn Sampler, seed: u64) -> Speed {
             texels
         }),
     }
+}
+
+/// Directions of light drawn per second on one core.
+pub(super) fn draws(codec: &MultilevelVq, seed: u64) -> f64 {
+    let questions = questions(codec.frame().texels(), seed);
+    rate(|n| {
+        for (i, q) in questions[n % QUESTIONS..][..256].iter().enumerate() {
+            // Any numbers will do: those of the directions at hand.
+            let u = [q.light.x.abs(), q.light.y.abs(), i as f32 / 256.0];
+            black_box(codec.sample(q.texel, &q.view, u));
+        }
+        256
+    })
 }
 
 fn questions(texels: usize, seed: u64) -> Vec<Question> {
