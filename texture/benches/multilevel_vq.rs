@@ -7,7 +7,7 @@ use capture::btf::{Btf, read_folder};
 use nalgebra::Vector3;
 use std::path::Path;
 use texture::btf::multilevel_vq::{Aim, Grid, Measure, MultilevelVq, Options, Phase, fit};
-use texture::btf::{Budget, Codec, Material, Precision, Sampler, to_coded_range};
+use texture::btf::{Budget, Codec, Material, Precision, Sampler, Score, score, to_coded_range};
 
 /// Answers timed.
 const COUNT: usize = 2_000_000;
@@ -52,7 +52,7 @@ fn report(btf: &Btf, options: &Options) {
     let before = cpu_seconds();
     let (codec, report) = fit(btf, options).expect("a fit");
     let seconds = cpu_seconds() - before;
-    let rmse = rmse(btf, &codec);
+    let Score { rmse, psnr_db: psnr, .. } = score(btf, &codec);
     let speeds = [evaluations(&codec), samples(&codec)];
     let material = Material {
         name: btf.name.clone(),
@@ -65,7 +65,6 @@ fn report(btf: &Btf, options: &Options) {
     };
     let (bytes, parts) = material.to_bytes();
     let ratio = btf.raw_bytes() as f64 / bytes.len() as f64;
-    let psnr = 20.0 * (255.0 / rmse).log10();
     println!(
         "{ratio:8.1} {:9} {rmse:7.3} {psnr:7.2} {seconds:9.1} {:10.2e} {:10.2e}",
         bytes.len(),
@@ -76,41 +75,25 @@ fn report(btf: &Btf, options: &Options) {
     println!("  {}; {:?} bytes: {}", report.notes.join("; "), report.objective, parts.join(", "));
 }
 
-fn rmse(btf: &Btf, codec: &MultilevelVq) -> f64 {
-    let mut sum = 0.0;
-    for (v, view) in btf.views.iter().enumerate() {
-        for (l, light) in btf.lights.iter().enumerate() {
-            let decoded = codec.picture(&light.cast(), &view.cast());
-            sum += decoded.iter().zip(btf.picture(v, l)).map(|(a, b)| f64::from(a - b).powi(2)).sum::<f64>();
-        }
-    }
-    255.0 * (sum / btf.samples.len() as f64).sqrt()
-}
-
 /// Of one core, at random texels, lights and views.
 fn evaluations(codec: &MultilevelVq) -> f64 {
     let directions = directions();
-    let texels = codec.frame().texels();
-    let mut sum = 0.0;
-    let start = cpu_seconds();
-    for i in 0..COUNT {
-        let texel = i.wrapping_mul(2_654_435_761) % texels;
-        sum += codec.value(texel, &directions[i % 1021], &directions[i % 1019])[1];
-    }
-    std::hint::black_box(sum);
-    COUNT as f64 / (cpu_seconds() - start)
+    rate(codec, |i, texel| codec.value(texel, &directions[i % 1021], &directions[i % 1019])[1])
 }
 
 fn samples(codec: &MultilevelVq) -> f64 {
     let directions = directions();
-    let texels = codec.frame().texels();
-    let mut sum = 0.0;
-    let start = cpu_seconds();
-    for i in 0..COUNT {
-        let texel = i.wrapping_mul(2_654_435_761) % texels;
+    rate(codec, |i, texel| {
         let u = [0.618_034, 0.754_877_7, 0.569_840_3].map(|step: f32| (step * (i % 65_536) as f32).fract());
-        sum += codec.sample(texel, &directions[i % 1019], u).1;
-    }
+        codec.sample(texel, &directions[i % 1019], u).1
+    })
+}
+
+/// Answers per second of CPU, at random texels.
+fn rate(codec: &MultilevelVq, answer: impl Fn(usize, usize) -> f32) -> f64 {
+    let texels = codec.frame().texels();
+    let start = cpu_seconds();
+    let sum: f32 = (0..COUNT).map(|i| answer(i, i.wrapping_mul(2_654_435_761) % texels)).sum();
     std::hint::black_box(sum);
     COUNT as f64 / (cpu_seconds() - start)
 }
