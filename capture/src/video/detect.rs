@@ -301,7 +301,7 @@ fn refined(
 }
 
 /// Between pixel centres, bilinear; `None` outside the frame.
-fn level(grey: &Image<u8>, pixel: Point2<f64>) -> Option<f64> {
+pub(super) fn level(grey: &Image<u8>, pixel: Point2<f64>) -> Option<f64> {
     let is_inside = |v: f64, size: usize| v >= 0.0 && v < size as f64;
     if !(is_inside(pixel.x, grey.width()) && is_inside(pixel.y, grey.height())) {
         return None;

@@ -1,10 +1,10 @@
 //! Finds out what kind of board is in the pictures, by trying.
 
-use super::detect::{apply, chessboard_counts, grey, guess_dictionary, homography, markers_in, often_seen};
+use super::detect::{apply, chessboard_counts, grey, guess_dictionary, homography, level, markers_in, often_seen};
 use super::{BoardView, FoundMarker, detect_board, detect_markers};
 use crate::board::{Board, Dictionary};
-use crate::{CaptureError, Image};
-use nalgebra::{Matrix3, Point2};
+use crate::{CaptureError, Image, srgb};
+use nalgebra::{Matrix3, Point2, Vector2};
 use opencv::aruco::CornerRefineMethod;
 use rayon::prelude::*;
 
@@ -21,6 +21,12 @@ pub enum Pattern {
 const FEWEST: usize = 5;
 /// A layout fits if the middles of markers lie this near to where it puts them, in sides of a marker.
 const FIT: f64 = 0.12;
+/// Sides of markers on ChArUco boards, in fortieths of a square: smaller ones are wasted paper, larger ones are not found.
+const FORTIETHS: std::ops::RangeInclusive<i32> = 20..=38;
+/// Places of a square that are looked at.
+const PLACES: usize = 256;
+/// (√5 − 1) / 2: its multiples are as far from whole numbers as can be.
+const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
 /// Finds out what is printed in the pictures: a ChArUco board, a grid of markers, markers in no order, a chessboard;
 /// `None` where there is nothing of the kind. A few pictures are enough. Lengths of boards are in squares or markers.
@@ -28,11 +34,11 @@ const FIT: f64 = 0.12;
 /// # Errors
 /// [`CaptureError::OpenCv`] where OpenCV fails.
 pub fn recognise_pattern(images: &[Image<[u8; 3]>]) -> Result<Option<Pattern>, CaptureError> {
-    let Some(dictionary) = guess_dictionary(images)? else {
-        return Ok(chessboard(images)?.map(Pattern::Board));
-    };
+    let dictionary = guess_dictionary(images)?;
+    let images: Vec<Image<u8>> = images.iter().map(grey).collect();
+    let Some(dictionary) = dictionary else { return Ok(chessboard(&images)?.map(Pattern::Board)) };
     let seen = images.iter().map(|image| {
-        let mut markers = markers_in(&grey(image), dictionary, CornerRefineMethod::CORNER_REFINE_SUBPIX)?;
+        let mut markers = markers_in(image, dictionary, CornerRefineMethod::CORNER_REFINE_SUBPIX)?;
         let ids: Vec<usize> = markers.iter().map(|m| m.id).collect();
         markers.retain(|m| ids.iter().filter(|&&id| id == m.id).count() == 1);
         Ok(markers)
@@ -40,15 +46,14 @@ pub fn recognise_pattern(images: &[Image<[u8; 3]>]) -> Result<Option<Pattern>, C
     let mut seen = seen.collect::<Result<Vec<Vec<FoundMarker>>, CaptureError>>()?;
     let known = often_seen(&seen.iter().flatten().map(|m| m.id).collect::<Vec<_>>());
     seen.iter_mut().for_each(|markers| markers.retain(|m| known.contains(&m.id)));
-    seen.retain(|markers| markers.len() >= FEWEST);
-    let Some(&highest) = known.last().filter(|_| !seen.is_empty()) else {
+    let Some(&highest) = known.last().filter(|_| seen.iter().any(|markers| markers.len() >= FEWEST)) else {
         // A square of a chessboard, or something in the room, may be misread as a marker.
-        return Ok(Some(chessboard(images)?.map_or(Pattern::Markers(dictionary), Pattern::Board)));
+        return Ok(Some(chessboard(&images)?.map_or(Pattern::Markers(dictionary), Pattern::Board)));
     };
     let board = candidates(dictionary, highest).par_bridge().filter_map(|board| Some((misfit(&board, &seen)?, board)));
     // Ties go to the board of fewer columns, whatever thread found it.
     let best = board.min_by(|(a, x), (b, y)| a.total_cmp(b).then(x.counts().cmp(&y.counts())));
-    let found = best.filter(|(misfit, _)| *misfit < FIT).and_then(|(_, board)| measured(&board, &seen));
+    let found = best.filter(|(misfit, _)| *misfit < FIT).and_then(|(_, board)| measured(&board, &images, &seen));
     Ok(Some(found.map_or(Pattern::Markers(dictionary), Pattern::Board)))
 }
 
@@ -142,7 +147,7 @@ fn middle_of(corners: &[Point2<f64>; 4]) -> Option<Point2<f64>> {
 
 /// The board with its markers as large as they are seen; `None` where they are turned another way or are of no size
 /// that could be.
-fn measured(board: &Board, seen: &[Vec<FoundMarker>]) -> Option<Board> {
+fn measured(board: &Board, images: &[Image<u8>], seen: &[Vec<FoundMarker>]) -> Option<Board> {
     let mut sides = Vec::new();
     let mut upright = 0_usize;
     for markers in seen {
@@ -157,9 +162,7 @@ fn measured(board: &Board, seen: &[Vec<FoundMarker>]) -> Option<Board> {
     sides.sort_by(f64::total_cmp);
     let side = *sides.get(sides.len() / 2)?;
     let measured = match *board {
-        Board::Charuco { columns, rows, dictionary, light_first, .. } => {
-            Board::Charuco { columns, rows, square: 1.0, marker: in_twentieths(side), dictionary, light_first }
-        }
+        Board::Charuco { .. } => likest(board, images, seen)?,
         Board::ArucoGrid { columns, rows, dictionary, .. } => {
             Board::ArucoGrid { columns, rows, marker: 1.0, gap: 1.0 / side - 1.0, dictionary }
         }
@@ -168,9 +171,54 @@ fn measured(board: &Board, seen: &[Vec<FoundMarker>]) -> Option<Board> {
     (2 * upright > sides.len() && measured.check().is_ok()).then_some(measured)
 }
 
-/// Only where corners of squares are free of print depends on it: no need for more.
-fn in_twentieths(share: f64) -> f64 {
-    (share * 20.0).round() / 20.0
+/// The board of squares of 1 whose markers are as large as is most like what is seen: all that is printed in a marker
+/// says so, while corners of small ones are drawn towards the squares beside them.
+fn likest(board: &Board, images: &[Image<u8>], seen: &[Vec<FoundMarker>]) -> Option<Board> {
+    let Board::Charuco { columns, rows, dictionary, light_first, .. } = *board else { return None };
+    let boards: Vec<Board> = FORTIETHS
+        .map(|share| f64::from(share) / 40.0)
+        .map(|marker| Board::Charuco { columns, rows, square: 1.0, marker, dictionary, light_first })
+        .collect();
+    let looked: Vec<Looked> =
+        images.iter().zip(seen).flat_map(|(image, markers)| around(board, image, markers)).collect();
+    let likeness: Vec<f64> =
+        boards.par_iter().map(|board| looked.iter().map(|places| correlation(board, places)).sum()).collect();
+    let best = (0..boards.len()).max_by(|&a, &b| likeness[a].total_cmp(&likeness[b]))?;
+    Some(boards[best])
+}
+
+/// Places of a board and the light seen there, white = 1.
+type Looked = Vec<(Point2<f64>, f64)>;
+
+/// The square of every marker that is seen: what is in it but for the size of the marker.
+fn around(board: &Board, image: &Image<u8>, markers: &[FoundMarker]) -> Vec<Looked> {
+    let Some((map, _)) = middles_map(board, markers) else { return Vec::new() };
+    let known = board.markers();
+    let of_marker = |marker: &FoundMarker| {
+        let corners = known.get(marker.id)?.corners;
+        let middle = nalgebra::center(&corners[0], &corners[2]).xy();
+        // Next to it the lens bends nothing.
+        let shift = middle_of(&marker.corners)? - apply(&map, &middle)?;
+        // A column and a row for every place: none lies along with what is printed.
+        let offset = |k: f64| Vector2::new(k / PLACES as f64, (k * GOLDEN).fract()).add_scalar(-0.5);
+        let places = (0..PLACES).map(|k| middle + offset(k as f64 + 0.5));
+        let look =
+            |place: Point2<f64>| Some((place, srgb::linear(level(image, apply(&map, &place)? + shift)? / 255.0)));
+        Some(places.filter_map(look).collect())
+    };
+    markers.iter().filter_map(of_marker).collect()
+}
+
+/// Pearson's, of what is printed and of what is seen; 0 where one of the two is the same everywhere.
+fn correlation(board: &Board, places: &Looked) -> f64 {
+    let pairs: Vec<[f64; 2]> =
+        places.iter().map(|&(place, light)| [f64::from(u8::from(!board.is_dark(place))), light]).collect();
+    let share = 1.0 / pairs.len().max(1) as f64;
+    let mean = |axis: usize| pairs.iter().map(|p| p[axis]).sum::<f64>() * share;
+    let means = [mean(0), mean(1)];
+    let product = |a: usize, b: usize| pairs.iter().map(|p| (p[a] - means[a]) * (p[b] - means[b])).sum::<f64>();
+    let variances = product(0, 0) * product(1, 1);
+    if variances > 0.0 { product(0, 1) / variances.sqrt() } else { 0.0 }
 }
 
 fn all<T: Copy>(found: [Option<T>; 4]) -> Option<[T; 4]> {
@@ -178,9 +226,9 @@ fn all<T: Copy>(found: [Option<T>; 4]) -> Option<[T; 4]> {
 }
 
 /// The chessboard most pictures show whole.
-fn chessboard(images: &[Image<[u8; 3]>]) -> Result<Option<Board>, CaptureError> {
+fn chessboard(images: &[Image<u8>]) -> Result<Option<Board>, CaptureError> {
     let counts: Vec<Option<[usize; 2]>> =
-        images.iter().map(|image| Ok(chessboard_counts(&grey(image))?)).collect::<Result<_, CaptureError>>()?;
+        images.iter().map(|image| Ok(chessboard_counts(image)?)).collect::<Result<_, CaptureError>>()?;
     let mut counts: Vec<[usize; 2]> = counts.into_iter().flatten().map(|[a, b]| [a.max(b), a.min(b)]).collect();
     counts.sort_unstable();
     let most = counts.chunk_by(|a, b| a == b).max_by_key(|same| same.len());

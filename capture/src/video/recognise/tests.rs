@@ -4,12 +4,18 @@ use crate::video::detect::tests::{camera, photograph};
 const VIEWS: [(f64, f64); 3] = [(0.2, 0.3), (-0.5, 1.0), (0.6, 2.6)];
 
 fn pictures(board: &Board) -> Vec<Image<[u8; 3]>> {
+    // So far away that it is seen whole.
+    pictures_from(board, 2.4)
+}
+
+/// From a distance in longer sides of the board.
+fn pictures_from(board: &Board, distance: f64) -> Vec<Image<[u8; 3]>> {
     let [width, height] = board.size();
     let view = |&(tilt, roll): &(f64, f64)| {
         let mut seen = camera(tilt, roll, 0.0);
-        // So far away that it is seen whole, and in the middle.
+        // In the middle.
         let centre = nalgebra::Vector3::new(0.5 * width, 0.5 * height, 0.0);
-        seen.translation = nalgebra::Vector3::new(0.0, 0.0, 2.4 * width.max(height)) - seen.rotation * centre;
+        seen.translation = nalgebra::Vector3::new(0.0, 0.0, distance * width.max(height)) - seen.rotation * centre;
         photograph(board, &seen)
     };
     VIEWS.iter().map(view).collect()
@@ -46,6 +52,16 @@ fn every_kind_of_board_is_found_out_by_looking_at_it() {
             }
             _ => assert_eq!(found, expected, "{text}"),
         }
+    }
+}
+
+/// Of small markers the corners are found too far out, towards the squares beside them.
+#[test]
+fn small_markers_are_found_as_large_as_they_are() {
+    for text in ["charuco:7x7:20mm:15mm:4x4_50", "charuco:7x7:20mm:14mm:4x4_50", "charuco:7x7:20mm:16mm:4x4_50"] {
+        let board: Board = text.parse().unwrap();
+        let found = recognise_pattern(&pictures_from(&board, 4.5)).unwrap();
+        assert_eq!(found, Some(Pattern::Board(in_squares(&board))), "{text}");
     }
 }
 
