@@ -4,6 +4,7 @@
 use super::Odds;
 use super::cut::Cut;
 use super::light::Toned;
+use super::palette::Palette;
 use crate::Image;
 use crate::matte::{components, signed_distance};
 
@@ -16,7 +17,8 @@ const SLOPE: f32 = 0.35;
 /// Log odds that a pixel of border costs where the picture is even.
 const BORDER: f32 = 7.5;
 
-/// A hole of which more than this share is object for the other views is a patch of the background's colour.
+/// A hole of which more than this share is object for the other views, in colours that the object shows elsewhere, is a
+/// patch of the background's colour.
 const LARGEST_SOLID: f64 = 0.7;
 
 /// Object (255) or not, for voting where no hull is known yet: in between where the odds are even.
@@ -26,9 +28,15 @@ pub(super) fn guessed(log_odds: &Image<f32>) -> Image<u8> {
 
 /// The silhouette (255 or 0): the cheapest border (Boykov and Jolly, Interactive Graph Cuts, ICCV 2001) given the odds,
 /// the hull of all views (object from 128 on), of which each pixel outside costs `distrust` of the log odds, and a price
-/// per pixel of border, lower along edges of the picture. With `fills_holes` the hull is good enough to say which holes
-/// are patches of the background's colour.
-pub(super) fn decided(picture: &Toned, odds: &Odds, hull: &Image<u8>, distrust: f32, fills_holes: bool) -> Image<u8> {
+/// per pixel of border, lower along edges of the picture. With `patches`, the colours of the object, the hull is good
+/// enough to say which holes are patches of the background's colour.
+pub(super) fn decided(
+    picture: &Toned,
+    odds: &Odds,
+    hull: &Image<u8>,
+    distrust: f32,
+    patches: Option<&Palette>,
+) -> Image<u8> {
     let distance = signed_distance(hull);
     let gain = odds.log_odds.pixels().iter().zip(distance.pixels()).map(|(&l, &d)| {
         let prior = if d > 0.0 { (SLOPE * d).min(TRUST) } else { distrust * d };
@@ -37,7 +45,10 @@ pub(super) fn decided(picture: &Toned, odds: &Odds, hull: &Image<u8>, distrust: 
     let gain = Image::from_pixels(hull.width(), hull.height(), gain.collect()).unwrap_or_default();
     let [right, down] = borders(picture, hull.width(), hull.height());
     let mask = Cut::new(&gain, &right, &down).inside();
-    without_specks(&mask, hull, if fills_holes { LARGEST_SOLID } else { 1.0 })
+    let width = hull.width();
+    let is_patch =
+        |at: usize| hull.pixels()[at] >= 128 && patches.is_some_and(|p| p.has(&picture.at(at % width, at / width)));
+    without_specks(&mask, &is_patch)
 }
 
 /// Log odds as whole numbers: flow in these ends, and is the same everywhere.
@@ -62,20 +73,18 @@ fn borders(picture: &Toned, width: usize, height: usize) -> [Image<i32>; 2] {
     squares.map(|s| s.map(|d| cost(BORDER * (-0.5 * d / mean).exp())))
 }
 
-/// Drops parts below a hundredth of the largest, fills holes below a two-thousandth of the object and those that the
-/// other views do not look through.
-fn without_specks(mask: &Image<bool>, hull: &Image<u8>, largest_solid: f64) -> Image<u8> {
+/// Drops parts below a hundredth of the largest, fills holes below a two-thousandth of the object and those of which most
+/// pixels are patches of it.
+fn without_specks(mask: &Image<bool>, is_patch: &dyn Fn(usize) -> bool) -> Image<u8> {
     let (sizes, labels) = components(mask);
     let largest = sizes.iter().max().copied().unwrap_or(0);
     let kept = labels.map(|l| l > 0 && sizes[l as usize - 1] * 100 >= largest);
     let object = kept.pixels().iter().filter(|k| **k).count();
     let (holes, labels) = components(&kept.map(|k| !k));
     let mut solid = vec![0_usize; holes.len()];
-    for (&label, &inside) in labels.pixels().iter().zip(hull.pixels()) {
-        if label > 0 && inside >= 128 {
-            solid[label as usize - 1] += 1;
-        }
+    for (at, &label) in labels.pixels().iter().enumerate().filter(|(_, l)| **l > 0) {
+        solid[label as usize - 1] += usize::from(is_patch(at));
     }
-    let is_open = |hole: usize| holes[hole] > object / 2000 && solid[hole] as f64 <= largest_solid * holes[hole] as f64;
+    let is_open = |hole: usize| holes[hole] > object / 2000 && solid[hole] as f64 <= LARGEST_SOLID * holes[hole] as f64;
     labels.map(|l| if l > 0 && is_open(l as usize - 1) { 0 } else { 255 })
 }

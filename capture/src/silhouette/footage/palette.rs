@@ -39,6 +39,11 @@ impl Palette {
     pub(super) fn log_density(&self, colour: &[f32; 3]) -> f32 {
         self.density[bin(colour)].ln()
     }
+
+    /// Whether a colour is seen more often than were all colours alike.
+    pub(super) fn has(&self, colour: &[f32; 3]) -> bool {
+        self.density[bin(colour)] >= 256.0_f32.powi(-3)
+    }
 }
 
 /// Of the object, and of what is around it.

@@ -21,20 +21,27 @@ const REACH: isize = 5;
 /// Error of the coverage that a silhouette without steps between pixels says.
 const MASK_ERROR: f32 = 0.5;
 
-/// Error of what is thought to be behind, encoded: of white, and as a share of the brighter side.
-const BACKGROUND_ERROR: (f32, f32) = (0.004, 0.05);
+/// Error of what is thought to be behind, encoded: of white, and as a share of the brighter side (a twentieth of the light).
+const BACKGROUND_ERROR: (f32, f32) = (0.004, 0.023);
 
 /// Pixels along the edge (standard deviation) that share their errors.
 const EVENED: f32 = 1.0;
 
 /// The matte to a silhouette (≥ 128) of `picture`, given what is behind it (encoded levels) where that is known.
 pub(super) fn refined(picture: &Toned, background: &Image<Option<[f32; 3]>>, mask: &Image<u8>) -> Image<u8> {
-    refined_once(picture, background, &refined_once(picture, background, mask))
+    let first = refined_beside(mask, picture, background, mask);
+    refined_beside(&first, picture, background, mask)
 }
 
-fn refined_once(picture: &Toned, background: &Image<Option<[f32; 3]>>, mask: &Image<u8>) -> Image<u8> {
+/// With the colours on both sides of `edge`.
+fn refined_beside(
+    edge: &Image<u8>,
+    picture: &Toned,
+    background: &Image<Option<[f32; 3]>>,
+    mask: &Image<u8>,
+) -> Image<u8> {
     let (width, height) = (mask.width(), mask.height());
-    let distance = signed_distance(mask);
+    let distance = signed_distance(edge);
     let soft = blur(&mask.map(f32::from), 0.7);
     let colour = |x: usize, y: usize| picture.at(x, y).map(|v| v / 255.0);
     let behind = |x: usize, y: usize| background.at(x, y).map(|b| b.map(|v| v / 255.0));

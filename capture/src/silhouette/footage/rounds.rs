@@ -248,7 +248,8 @@ impl Scene<'_> {
             let colours = colours(&picture, &even, &matte);
             return Part { cutout, camera, matte, unseparated: 0.0, colours };
         };
-        let mask = decision::decided(&picture, &odds, &hull, round.distrust, round.fills_holes);
+        let patches = round.fills_holes.then_some(&belief.palettes.object);
+        let mask = decision::decided(&picture, &odds, &hull, round.distrust, patches);
         let matte = if round.is_refined { rim::refined(&picture, &odds.background, &mask) } else { mask };
         let colours = colours(&picture, &even, &matte);
         Part { cutout, camera, matte, unseparated: unseparated(&even, &hull), colours }

@@ -274,12 +274,13 @@ fn the_number_of_threads_changes_nothing() {
     assert_eq!((one.mattes, one.agreement, one.gains), (three.mattes, three.agreement, three.gains));
 }
 
-/// A straight edge at a known place within the pixel: the coverage in linear light, not in encoded levels.
+/// A straight edge at a known place within the pixel, mixed as a film mixes hues: after encoding.
 #[test]
-fn coverage_at_the_rim_is_linear_in_light() {
+fn coverage_at_the_rim_is_linear_in_encoded_levels() {
     for part in [0.1, 0.3, 0.5, 0.8] {
         let (object, cloth) = ([0.6, 0.3, 0.2], [0.05, 0.4, 0.1]);
-        let level = |alpha: f32| [0, 1, 2].map(|c| encoded(alpha * object[c] + (1.0 - alpha) * cloth[c]).round() as u8);
+        let mixed = |c: usize, alpha: f32| alpha * encoded(object[c]) + (1.0 - alpha) * encoded(cloth[c]);
+        let level = |alpha: f32| [0, 1, 2].map(|c| mixed(c, alpha).round() as u8);
         let mut picture = Image::filled(24, 24, level(0.0));
         let mut mask = Image::filled(24, 24, 0);
         for y in 0..24 {
@@ -398,4 +399,28 @@ fn what_the_object_shows_near_by_is_likelier_there() {
     let at = |x: usize| near.log_density(&[46.0, 40.0, 41.0], x, 40, &all);
     assert!(at(140) > all.log_density(&[46.0, 40.0, 41.0]) + 3.0, "{}", at(140));
     assert!(at(20) < at(140) - 5.0, "{} {}", at(20), at(140));
+}
+
+/// The handle of a mug before cloth, and a patch of glaze as green as the cloth: the hull takes both for solid.
+#[test]
+fn a_hole_is_filled_where_the_object_has_the_colour_seen_in_it() {
+    let (cloth, glaze) = ([40, 120, 50], [180, 50, 40]);
+    let mut picture = Image::filled(40, 40, cloth);
+    let mut hull = Image::filled(40, 40, 0);
+    for (x, y) in (8..32).flat_map(|y| (8..32).map(move |x| (x, y))) {
+        hull.set(x, y, 255);
+        if !(15..25).contains(&x) || !(15..25).contains(&y) {
+            picture.set(x, y, glaze);
+        }
+    }
+    let log_odds = picture.map(|p| if p == glaze { 8.0 } else { -8.0 });
+    let odds = Odds { log_odds, background: Image::filled(40, 40, Some(cloth.map(f32::from))) };
+    let picture = light::Toned::new(picture, &[1.0; 3]);
+    for (shown, is_filled) in [(vec![glaze], false), (vec![glaze, cloth], true)] {
+        let seen = shown.iter().cycle().take(8000).map(|colour| colour.map(f32::from));
+        let palette = palette::Palette::learned(seen);
+        let mask = decision::decided(&picture, &odds, &hull, 0.5, Some(&palette));
+        assert_eq!(mask.at(20, 20) == 255, is_filled, "{shown:?}");
+        assert_eq!((mask.at(10, 20), mask.at(3, 20)), (255, 0));
+    }
 }
