@@ -44,7 +44,7 @@ class RayBlend:
         points, views = self.points[part], self.views[part]
         is_ray = views != NO_RAY
         penalties = np.where(is_ray, self._penalties(points, views * is_ray, eye), np.inf)
-        nearest = np.argsort(penalties, axis=1, kind="stable")[:, : BLENDED + 1]
+        nearest = _least(penalties, BLENDED + 1)
         penalties = np.take_along_axis(penalties, nearest, axis=1)
         count = np.minimum(is_ray.sum(axis=1), BLENDED + 1)
         last = np.take_along_axis(penalties, np.maximum(count - 1, 0)[:, None], axis=1)
@@ -61,10 +61,23 @@ class RayBlend:
 
     def _penalties(self, points, views, eye):
         """|normalize(c_i − p) − normalize(e − p)|, texels × slots."""
-        to_eye = _unit(eye - points)
-        to_views = _unit(self.centers[views] - points[:, None])
-        return np.linalg.norm(to_views - to_eye[:, None], axis=-1)
+        to_eye = _unit(eye - points).astype(np.float32)
+        to_views = _unit((self.centers[views] - points[:, None]).astype(np.float32))
+        return _norms(to_views - to_eye[:, None])
+
+
+def _least(values, count):
+    """Columns of the `count` least values of each row, ascending; all where there are fewer."""
+    columns = np.arange(values.shape[1])[None].repeat(len(values), axis=0)
+    if values.shape[1] > count:
+        columns = np.argpartition(values, count - 1, axis=1)[:, :count]
+    order = np.argsort(np.take_along_axis(values, columns, axis=1), axis=1, kind="stable")
+    return np.take_along_axis(columns, order, axis=1)
+
+
+def _norms(v):
+    return np.sqrt(np.einsum("...i,...i->...", v, v))
 
 
 def _unit(v):
-    return v / np.maximum(np.linalg.norm(v, axis=-1, keepdims=True), 1e-300)
+    return v / np.maximum(_norms(v), np.finfo(v.dtype).tiny)[..., None]

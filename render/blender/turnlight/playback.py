@@ -14,7 +14,7 @@ from .objects import MODEL, picture_of
 
 # How often viewports are looked at.
 PERIOD_S = 0.04
-# Of an orthographic camera, how many of its distances the eye is away.
+# World units, or distances of an orthographic camera from the origin, that are as good as infinitely far.
 FAR = 1e4
 
 # By picture (its session's number): its player; None where its model is refused.
@@ -36,7 +36,9 @@ class Player:
 
 
 def adopt(image, player):
-    """Lets `player` play `image`."""
+    """Lets `player` play `image`; forgets those of pictures that are gone."""
+    for gone in _players.keys() - {image.session_uid for image in bpy.data.images}:
+        del _players[gone]
     _players[image.session_uid] = player
 
 
@@ -65,8 +67,9 @@ def play(scene, depsgraph, eye):
 
 
 def _camera_eye(scene, depsgraph):
+    """Where the scene's camera is; far in front of all without one."""
     if scene.camera is None:
-        return None
+        return Vector((0.0, -FAR, 0.0))
     pose = scene.camera.evaluated_get(depsgraph).matrix_world
     if scene.camera.data.type != "ORTHO":
         return pose.translation.copy()
@@ -75,7 +78,8 @@ def _camera_eye(scene, depsgraph):
 
 def _free_viewport():
     """The first viewport that looks at the scene on its own; None where all look through the camera."""
-    for window in bpy.context.window_manager.windows:
+    # Without a screen, windows are there that nobody sees.
+    for window in [] if bpy.app.background else bpy.context.window_manager.windows:
         for area in window.screen.areas:
             if area.type == "VIEW_3D" and area.spaces.active.region_3d.view_perspective != "CAMERA":
                 return window, area
@@ -89,8 +93,7 @@ def play_what_is_seen(scene, depsgraph):
         eye = _camera_eye(scene, depsgraph)
     else:
         eye = found[1].spaces.active.region_3d.view_matrix.inverted().translation
-    if eye is not None:
-        play(scene, depsgraph, eye)
+    play(scene, depsgraph, eye)
 
 
 @persistent

@@ -6,8 +6,8 @@ import numpy as np
 def surface_points(mesh, size):
     """Points of the surface that texels show: which texels (ascending, row by row) and where (texels × 3, world).
 
-    A texel shows the point nearest to its centre of the nearest triangle. Texels farther than one from a triangle's
-    box do not show it: no bilinear sampler of it reads them. Triangles without area are skipped.
+    A texel shows the point nearest to its centre of the nearest triangle, among those that meet the open square of
+    half-width 1 about the centre: bilinear samplers of others do not read it. Triangles without area are skipped.
     """
     width, height = size
     distances = np.full((height, width), np.inf)
@@ -22,6 +22,7 @@ def surface_points(mesh, size):
         columns, rows = slice(low[0], high[0]), slice(low[1], high[1])
         centres = np.stack(np.meshgrid(np.arange(low[0], high[0]), np.arange(low[1], high[1])), axis=-1) + 0.5
         weights, squared = _nearest_in_triangle(corners, area, centres)
+        squared[~_meets_square(corners, area, centres)] = np.inf
         is_nearer = squared < distances[rows, columns]
         distances[rows, columns][is_nearer] = squared[is_nearer]
         points[rows, columns][is_nearer] = weights[is_nearer] @ mesh.positions[face]
@@ -31,6 +32,16 @@ def surface_points(mesh, size):
 
 def _perp(a, b):
     return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+
+
+def _meets_square(corners, area, p):
+    """Whether the triangle meets the open square of half-width 1 about p, which its box is known to."""
+    meets = np.ones(p.shape[:-1], bool)
+    for k in range(3):
+        start, edge = corners[k], corners[(k + 1) % 3] - corners[k]
+        normal = np.array([-edge[1], edge[0]]) * np.sign(area)
+        meets &= (p - start) @ normal + np.abs(normal).sum() > 0.0
+    return meets
 
 
 def _nearest_in_triangle(corners, area, p):
