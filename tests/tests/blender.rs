@@ -7,6 +7,7 @@ use capture::{Camera, Image, read_rgb};
 use data_synth::{Effort, Layout, Scene, SynthOptions, synthesize};
 use nalgebra::Point3;
 use serde_json::{Value, json};
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use tests::hostile::hostile;
@@ -67,6 +68,21 @@ fn model(bytes: &[u8]) -> Model {
 fn layers(model: &Model) -> &Layers {
     let Appearance::Layers(layers) = &model.appearance else { panic!("{} has no layers", model.method.name()) };
     layers
+}
+
+#[test]
+fn the_folder_holds_the_model_the_add_on_and_what_to_do_with_them() {
+    let place = tempfile::tempdir().expect("a folder");
+    let file = played().model(Method::Static);
+    let folder = exported(place.path(), file, "blender");
+    let names: BTreeSet<String> = std::fs::read_dir(&folder)
+        .expect("a folder")
+        .map(|entry| entry.expect("an entry").file_name().to_string_lossy().into_owned())
+        .collect();
+    assert!(names.iter().eq([".turnlight", "README.txt", "model.glb", "turnlight-addon.zip"]), "{names:?}");
+    assert_eq!(std::fs::read(folder.join("model.glb")).expect("a model"), file);
+    let text = std::fs::read_to_string(folder.join("README.txt")).expect("text");
+    assert!(["turnlight-addon.zip", "model.glb"].iter().all(|name| text.contains(name)), "{text}");
 }
 
 /// A model of views all over a dome, whose directions are triangulated; views on one ring are not.
@@ -142,7 +158,7 @@ fn texels_show_the_points_of_the_surface_that_ours_do() {
     report(&python, "read.py", place.path(), Some(&addon), &[case]);
     let bytes = std::fs::read(surface).expect("points");
     let numbers: Vec<f64> = bytes.as_chunks::<8>().0.iter().map(|&b| f64::from_le_bytes(b)).collect();
-    let theirs: std::collections::BTreeMap<u32, Point3<f64>> =
+    let theirs: BTreeMap<u32, Point3<f64>> =
         numbers.as_chunks::<4>().0.iter().map(|&[i, x, y, z]| (i as u32, Point3::new(x, y, z))).collect();
     let model = model(file);
     let ours = SurfaceTexels::bake(&model.mesh);

@@ -176,10 +176,10 @@ class _Reader:
         return self.accessor(index, component, kind, per, what)
 
     def floats(self, index, kind, per, what):
-        values = self.accessor(index, FLOAT, kind, per, what).astype(np.float64)
+        values = self.accessor(index, FLOAT, kind, per, what)
         if not np.isfinite(values).all():
             raise ModelError(f"its {what} hold a value that is no number")
-        return values
+        return values.astype(np.float64)
 
     def image(self, index, size, what):
         """The bytes of an image whose header says `size`."""

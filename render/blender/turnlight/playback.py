@@ -19,6 +19,8 @@ FAR = 1e4
 
 # By picture (its session's number): its player; None where its model is refused.
 _players = {}
+# The eye of the viewport when the timer looked last.
+_looked_from = None
 
 
 class Player:
@@ -46,7 +48,10 @@ def _player(image):
     """The player of a picture; made of the model it carries where the file has just been opened."""
     if image.session_uid not in _players:
         try:
-            adopt(image, Player(glb.read(image[MODEL])))
+            model = glb.read(image[MODEL])
+            if tuple(image.size) != model.size:
+                raise glb.ModelError(f"its picture is {image.size[0]}×{image.size[1]}, not of the model's size")
+            adopt(image, Player(model))
         except glb.ModelError as fault:
             print(f"Turnlight: {image.name}: {fault}")
             adopt(image, None)
@@ -55,6 +60,8 @@ def _player(image):
 
 def play(scene, depsgraph, eye):
     """Blends every model of `scene` for `eye` (world). Of objects that share a picture, the first by name decides."""
+    if not any(MODEL in image for image in bpy.data.images):
+        return
     played = set()
     for held in sorted(scene.objects, key=lambda held: held.name):
         image = picture_of(held)
@@ -76,24 +83,20 @@ def _camera_eye(scene, depsgraph):
     return pose @ Vector((0.0, 0.0, FAR * max(pose.translation.length, 1.0)))
 
 
-def _free_viewport():
-    """The first viewport that looks at the scene on its own; None where all look through the camera."""
+def _viewport_eye():
+    """That of the first viewport that looks at the scene on its own; None where all look through the camera."""
     # Without a screen, windows are there that nobody sees.
     for window in [] if bpy.app.background else bpy.context.window_manager.windows:
         for area in window.screen.areas:
             if area.type == "VIEW_3D" and area.spaces.active.region_3d.view_perspective != "CAMERA":
-                return window, area
+                return area.spaces.active.region_3d.view_matrix.inverted_safe().translation
     return None
 
 
 def play_what_is_seen(scene, depsgraph):
     """Blends every model of `scene` for whoever looks at it."""
-    found = None if depsgraph.mode == "RENDER" else _free_viewport()
-    if found is None:
-        eye = _camera_eye(scene, depsgraph)
-    else:
-        eye = found[1].spaces.active.region_3d.view_matrix.inverted().translation
-    play(scene, depsgraph, eye)
+    eye = None if depsgraph.mode == "RENDER" else _viewport_eye()
+    play(scene, depsgraph, _camera_eye(scene, depsgraph) if eye is None else eye)
 
 
 @persistent
@@ -117,11 +120,11 @@ def _on_save(_path):
 
 
 def _look():
-    found = _free_viewport()
-    if found is not None and not bpy.app.is_job_running("RENDER"):
-        window, area = found
-        with bpy.context.temp_override(window=window, area=area):
-            _on_change(window.scene, bpy.context.evaluated_depsgraph_get())
+    global _looked_from
+    eye = _viewport_eye()
+    if eye != _looked_from and not bpy.app.is_job_running("RENDER"):
+        _looked_from = eye
+        _on_change(bpy.context.scene, bpy.context.evaluated_depsgraph_get())
     return PERIOD_S
 
 
