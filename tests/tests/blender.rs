@@ -262,6 +262,8 @@ fn cycles_draws_what_the_renderer_draws_and_again_after_saving() {
     let turn = [[0.0, -2.0, 0.0, 3.0], [0.0, 0.0, -2.0, -1.0], [2.0, 0.0, 0.0, 0.5], [0.0, 0.0, 0.0, 1.0]];
     cases.push(case(place.path(), "turned", json!({"model": at("dyntex.glb"), "turn": turn})));
     cases.push(case(place.path(), "animated", json!({"model": at("dyntex.glb"), "animated": true})));
+    let rest = json!({"model": at("dyntex.glb"), "animated": true, "baked": at("frames"), "save": at("baked.blend")});
+    cases.push(case(place.path(), "baked", rest));
     report(&python, "play.py", place.path(), Some(&addon), &cases);
     for (name, method) in Method::ALL.map(|m| (m.name(), m)).into_iter().chain([("turned", Method::DynTex)]) {
         let model = model(played().model(method));
@@ -274,6 +276,7 @@ fn cycles_draws_what_the_renderer_draws_and_again_after_saving() {
     }
     let first = |name: &str| pictures(place.path(), name);
     assert!(first("dyntex") == first("animated"), "frames of an animation are drawn otherwise than stills");
+    assert!(first("dyntex") == first("baked"), "baked frames differ");
     // In another process, first with the add-on, then without.
     let again =
         |name: &str| case(place.path(), &format!("{name} again"), json!({"blend": at(&format!("{name}.blend"))}));
@@ -284,7 +287,9 @@ fn cycles_draws_what_the_renderer_draws_and_again_after_saving() {
     }
     std::fs::remove_dir_all(at("resources")).expect("Blender's folders");
     let alone = case(place.path(), "alone", json!({"blend": at("dyntex.blend")}));
-    report(&python, "play.py", place.path(), None, &[alone]);
+    let baked = case(place.path(), "baked alone", json!({"blend": at("baked.blend"), "animated": true}));
+    report(&python, "play.py", place.path(), None, &[alone, baked]);
+    assert!(first("dyntex") == first("baked alone"), "what was baked still wants the add-on");
     assert!(first("alone")[1] == first("dyntex")[1], "what was seen last is lost without the add-on");
     assert!(first("alone")[0] != first("dyntex")[0], "without the add-on the object cannot follow the camera");
 }

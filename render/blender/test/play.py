@@ -1,11 +1,12 @@
 """python play.py JOB.json: plays models in Blender and writes what came of it to the job's `report`.
 
-JOB: { addon, report, cases: [{ model | blend | obj, turn, cameras, output, supersample, animated, save }] }.
+JOB: { addon, report, cases: [{ model | blend | obj, turn, cameras, output, supersample, animated, baked, save }] }.
 `addon` is the .zip, installed as a user would below BLENDER_USER_RESOURCES, or null to go without. `model` is imported
 by the add-on, `blend` was saved before, `obj` is imported by Blender alone. `turn` (4 × 4) moves object and cameras.
 For each of `cameras` (frames of a transforms.json) comes a picture, NNNN.png in `output`: supersample² pixels for each
-of the camera's, a sample in the middle of each; `animated` takes them as the frames of one animation. Reported are
-`refused`, what the operator said, and the numbers of data-blocks that are there in the end.
+of the camera's, a sample in the middle of each; `animated` takes them as the frames of one animation, after the object
+was baked to pictures in the folder `baked`, where one is named. Reported are `refused`, what the operator said, and
+what is there in the end.
 """
 
 import json
@@ -61,11 +62,14 @@ def open_or_import(case):
 
 def animate(case):
     scene = bpy.context.scene
-    scene.frame_start, scene.frame_end = 0, len(case["cameras"]) - 1
-    for number, frame in enumerate(case["cameras"]):
-        look(frame, case)
-        scene.camera.keyframe_insert("location", frame=number)
-        scene.camera.keyframe_insert("rotation_euler", frame=number)
+    if "blend" not in case:
+        scene.frame_start, scene.frame_end = 0, len(case["cameras"]) - 1
+        for number, frame in enumerate(case["cameras"]):
+            look(frame, case)
+            scene.camera.keyframe_insert("location", frame=number)
+            scene.camera.keyframe_insert("rotation_euler", frame=number)
+    if "baked" in case:
+        bpy.ops.object.turnlight_bake(directory=case["baked"])
     scene.render.filepath = f"{case['output']}/"
     bpy.ops.render.render(animation=True)
 

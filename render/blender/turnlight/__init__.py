@@ -1,6 +1,7 @@
-"""Imports models of Turnlight and plays them: File > Import > Turnlight, or
+"""Imports models of Turnlight and plays them: File > Import > Turnlight and Object > Bake Turnlight to Pictures, or
 
     bpy.ops.import_scene.turnlight(filepath="model.glb")
+    bpy.ops.object.turnlight_bake(directory="//pictures")
 """
 
 import pathlib
@@ -10,6 +11,7 @@ from bpy.props import BoolProperty, StringProperty
 from bpy_extras.io_utils import ImportHelper
 
 from . import glb, playback
+from .bake import BakeTurnlight
 from .objects import new_object, picture_of
 
 
@@ -62,17 +64,25 @@ class ImportTurnlight(bpy.types.Operator, ImportHelper):
         playback.play_what_is_seen(scene, context.evaluated_depsgraph_get())
 
 
-def _menu(self, _context):
+def _import_menu(self, _context):
     self.layout.operator(ImportTurnlight.bl_idname, text="Turnlight (.glb)")
+
+
+def _object_menu(self, _context):
+    self.layout.operator(BakeTurnlight.bl_idname)
 
 
 def register():
     bpy.utils.register_class(ImportTurnlight)
-    bpy.types.TOPBAR_MT_file_import.append(_menu)
+    bpy.utils.register_class(BakeTurnlight)
+    bpy.types.TOPBAR_MT_file_import.append(_import_menu)
+    bpy.types.VIEW3D_MT_object.append(_object_menu)
     playback.register()
 
 
 def unregister():
     playback.unregister()
-    bpy.types.TOPBAR_MT_file_import.remove(_menu)
+    bpy.types.VIEW3D_MT_object.remove(_object_menu)
+    bpy.types.TOPBAR_MT_file_import.remove(_import_menu)
+    bpy.utils.unregister_class(BakeTurnlight)
     bpy.utils.unregister_class(ImportTurnlight)

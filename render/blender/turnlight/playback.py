@@ -73,7 +73,7 @@ def play(scene, depsgraph, eye):
             player.play(image, held.evaluated_get(depsgraph).matrix_world.inverted_safe() @ eye)
 
 
-def _camera_eye(scene, depsgraph):
+def camera_eye(scene, depsgraph):
     """Where the scene's camera is; far in front of all without one."""
     if scene.camera is None:
         return Vector((0.0, -FAR, 0.0))
@@ -96,7 +96,7 @@ def _viewport_eye():
 def play_what_is_seen(scene, depsgraph):
     """Blends every model of `scene` for whoever looks at it."""
     eye = None if depsgraph.mode == "RENDER" else _viewport_eye()
-    play(scene, depsgraph, _camera_eye(scene, depsgraph) if eye is None else eye)
+    play(scene, depsgraph, camera_eye(scene, depsgraph) if eye is None else eye)
 
 
 @persistent
