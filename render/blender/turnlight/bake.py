@@ -3,9 +3,11 @@
 import pathlib
 
 import bpy
+import numpy as np
 
 from . import playback
 from .objects import PICTURE, picture_of
+from .pictures import new_atlas
 
 
 def bake(context, held, folder):
@@ -17,15 +19,27 @@ def bake(context, held, folder):
     folder.mkdir(parents=True, exist_ok=True)
     name = bpy.path.clean_name(held.name)
     now = scene.frame_current
-    image.file_format = "PNG"
     for frame in range(scene.frame_start, scene.frame_end + 1):
         scene.frame_set(frame)
         depsgraph = context.evaluated_depsgraph_get()
         playback.play(scene, depsgraph, playback.camera_eye(scene, depsgraph))
-        image.save(filepath=str(folder / f"{name}_{frame:04}.png"), save_copy=True)
+        _write(image, folder / f"{name}_{frame:04}.png")
     _wear(held, image, _sequence(folder / f"{name}_{scene.frame_start:04}.png"), scene)
     del held[PICTURE]
     scene.frame_set(now)
+
+
+def _write(image, path):
+    """A picture of its own is written: one that has been saved belongs to its file."""
+    values = np.empty(len(image.pixels), np.float32)
+    image.pixels.foreach_get(values)
+    written = new_atlas(path.stem, image.size)
+    try:
+        written.pixels.foreach_set(values)
+        written.filepath_raw, written.file_format = str(path), "PNG"
+        written.save()
+    finally:
+        bpy.data.images.remove(written)
 
 
 def _sequence(first):
