@@ -45,7 +45,7 @@ fn median(mut times: Vec<Duration>) -> f64 {
 }
 
 fn table() {
-    println!("ms, medians of 31 frames   | setup | visibility | mips | shading | all  | reference | covered");
+    println!("ms, medians of 31 frames   | setup | visibility | blend| shading | all  | reference | covered");
     for (shape, width, height, n) in FRAMES {
         let s = scene(shape, width, height, n);
         let mut player = cpu::Player::new(&s.mesh, s.options);
@@ -65,7 +65,7 @@ fn table() {
             s.mesh.mesh.faces.len(),
             of(|r| r.0.setup),
             of(|r| r.0.visibility),
-            of(|r| r.0.mips),
+            of(|r| r.0.blend),
             of(|r| r.0.shading),
             of(|r| r.1),
             reference,

@@ -9,6 +9,7 @@
 
 use capture::Image;
 use rayon::prelude::*;
+use std::borrow::Cow;
 
 /// Mip levels below this count as level 0. A 1:1 view then reads level 0 alone despite rounding;
 /// graphics hardware quantises levels to the same 1/256.
@@ -25,28 +26,83 @@ const HALVINGS: [f32; 64] = {
     scales
 };
 
-/// An atlas and as many reductions of it as were asked for.
-#[derive(Clone, Debug)]
-pub struct MipChain<'a> {
-    base: &'a Image<[f32; 3]>,
-    reduced: Vec<Image<[f32; 3]>>,
+/// A channel of a texel: `f32` in levels of 0..=255, or `i16` in shares of one ([`FIXED_ONE`]).
+pub trait Channel: Copy + Default + Send + Sync + std::fmt::Debug + 'static {
+    /// Levels of 0..=255 per unit.
+    const LEVELS: f32;
+
+    /// As it is, in its own units.
+    fn widened(self) -> f32;
+
+    /// The mean of four; whole numbers round half up.
+    fn mean(four: [Self; 4]) -> Self;
 }
 
-impl<'a> MipChain<'a> {
+/// Binary places of a texel in fixed point, which so reaches from −1024 to 1023.97 levels of 0..=255.
+pub const FIXED_PLACES: u32 = 5;
+
+/// One level of 0..=255 in a texel of fixed point.
+pub const FIXED_ONE: f32 = (1 << FIXED_PLACES) as f32;
+
+impl Channel for f32 {
+    const LEVELS: f32 = 1.0;
+
+    #[inline(always)]
+    fn widened(self) -> f32 {
+        self
+    }
+
+    #[inline(always)]
+    fn mean([a, b, c, d]: [Self; 4]) -> Self {
+        0.25 * (a + b + c + d)
+    }
+}
+
+impl Channel for i16 {
+    const LEVELS: f32 = 1.0 / FIXED_ONE;
+
+    #[inline(always)]
+    fn widened(self) -> f32 {
+        f32::from(self)
+    }
+
+    #[inline(always)]
+    fn mean(four: [Self; 4]) -> Self {
+        let [a, b, c, d] = four.map(i32::from);
+        ((a + b + c + d + 2) >> 2) as Self
+    }
+}
+
+/// `log2(1 + m) = m (1 + (1 − m) P(m))`: coefficients of P.
+const LOG2: [f32; 4] = [0.441_917_04, -0.267_179_4, 0.148_426_61, -0.045_149_03];
+
+/// An atlas and as many reductions of it as were asked for.
+#[derive(Clone, Debug)]
+pub struct MipChain<'a, T: Channel = f32> {
+    base: &'a Image<[T; 3]>,
+    reduced: Cow<'a, [Image<[T; 3]>]>,
+}
+
+impl<'a, T: Channel> MipChain<'a, T> {
     /// The atlas with levels 1 ..= `top`, or up to the level of one texel where that is lower.
-    pub fn build(base: &'a Image<[f32; 3]>, top: usize) -> Self {
+    pub fn build(base: &'a Image<[T; 3]>, top: usize) -> Self {
         let top = top.min(top_level(base.width(), base.height()));
-        let mut reduced: Vec<Image<[f32; 3]>> = Vec::with_capacity(top);
+        let mut reduced: Vec<Image<[T; 3]>> = Vec::with_capacity(top);
         for _ in 0..top {
             let next = halved(reduced.last().unwrap_or(base));
             reduced.push(next);
         }
-        Self { base, reduced }
+        Self { base, reduced: reduced.into() }
+    }
+
+    /// Levels made elsewhere: level 0, and those from 1 on.
+    pub(crate) fn of(base: &'a Image<[T; 3]>, reduced: &'a [Image<[T; 3]>]) -> Self {
+        Self { base, reduced: reduced.into() }
     }
 
     /// The texels of `level`, 0 being the atlas; the coarsest built where `level` lies beyond.
     #[inline]
-    pub fn level(&self, level: usize) -> &Image<[f32; 3]> {
+    pub fn level(&self, level: usize) -> &Image<[T; 3]> {
         match level.min(self.reduced.len()) {
             0 => self.base,
             l => &self.reduced[l - 1],
@@ -54,19 +110,19 @@ impl<'a> MipChain<'a> {
     }
 
     /// The texture at (`x`, `y`) in texels of level 0, outer corner of the first texel (0, 0),
-    /// filtered trilinearly for a fractional `level`. Zero of an empty atlas.
-    #[inline]
+    /// filtered trilinearly for a fractional `level`; in levels of 0..=255. Zero of an empty atlas.
+    #[inline(always)]
     pub fn sample(&self, x: f32, y: f32, level: f32) -> [f32; 3] {
         let level = level.min(self.reduced.len() as f32);
         // Also the way out for NaN.
         if level.is_nan() || level < MIN_LEVEL {
-            return bilinear(self.base, x, y);
+            return bilinear(self.base, x, y).map(|v| v * T::LEVELS);
         }
         let fine = level as usize;
         let scale = HALVINGS[fine.min(HALVINGS.len() - 1)];
         let a = bilinear(self.level(fine), x * scale, y * scale);
         let b = bilinear(self.level(fine + 1), x * scale * 0.5, y * scale * 0.5);
-        mixed(a, b, level - fine as f32)
+        mixed(a, b, level - fine as f32).map(|v| v * T::LEVELS)
     }
 }
 
@@ -84,43 +140,60 @@ pub fn level_of_footprint(footprint_squared: f32) -> f32 {
     if footprint_squared > 1.0 { 0.5 * footprint_squared.log2() } else { 0.0 }
 }
 
+/// [`level_of_footprint`] to 1e-5 of a level, in a form that compilers vectorise: the exponent of the float, and a
+/// polynomial of its mantissa, the minimax one for log2 on 1..=2 among those that are exact at both ends.
+#[inline(always)]
+pub(crate) fn quick_level_of_footprint(footprint_squared: f32) -> f32 {
+    let bits = footprint_squared.to_bits();
+    let exponent = (bits >> 23) as i32 - 127;
+    let m = f32::from_bits((bits & 0x007f_ffff) | 0x3f80_0000) - 1.0;
+    let log2 = m * (1.0 + (1.0 - m) * (LOG2[0] + m * (LOG2[1] + m * (LOG2[2] + m * LOG2[3]))));
+    // A comparison that NaN fails.
+    if footprint_squared > 1.0 { 0.5 * (exponent as f32 + log2) } else { 0.0 }
+}
+
 /// Half the size, each texel the mean of 2 × 2.
-fn halved(fine: &Image<[f32; 3]>) -> Image<[f32; 3]> {
+fn halved<T: Channel>(fine: &Image<[T; 3]>) -> Image<[T; 3]> {
     let (width, height) = (fine.width().div_ceil(2), fine.height().div_ceil(2));
-    let mut coarse = Image::filled(width, height, [0.0; 3]);
+    let mut coarse = Image::filled(width, height, [T::default(); 3]);
     // An image without texels has no chunks.
     let width = width.max(1);
     coarse.pixels_mut().par_chunks_mut(width).with_min_len(16).enumerate().for_each(|(y, row)| {
-        let above = fine.row(2 * y);
-        let below = fine.row((2 * y + 1).min(fine.height() - 1));
-        for ((texel, a), b) in row.iter_mut().zip(above.chunks(2)).zip(below.chunks(2)) {
-            let ([a0, .., a1] | [a0 @ a1]) = a else { continue };
-            let ([b0, .., b1] | [b0 @ b1]) = b else { continue };
-            for c in 0..3 {
-                texel[c] = 0.25 * (a0[c] + a1[c] + b0[c] + b1[c]);
-            }
-        }
+        halve_row(fine.row(2 * y), fine.row((2 * y + 1).min(fine.height() - 1)), row);
     });
     coarse
 }
 
-/// One level at (`x`, `y`) in its own texels, borders repeated.
-#[inline]
-fn bilinear(image: &Image<[f32; 3]>, x: f32, y: f32) -> [f32; 3] {
+/// Half of two rows; an odd last texel is repeated.
+#[inline(always)]
+pub(crate) fn halve_row<T: Channel>(above: &[[T; 3]], below: &[[T; 3]], out: &mut [[T; 3]]) {
+    for ((texel, a), b) in out.iter_mut().zip(above.chunks(2)).zip(below.chunks(2)) {
+        let ([a0, .., a1] | [a0 @ a1]) = a else { continue };
+        let ([b0, .., b1] | [b0 @ b1]) = b else { continue };
+        for c in 0..3 {
+            texel[c] = T::mean([a0[c], a1[c], b0[c], b1[c]]);
+        }
+    }
+}
+
+/// One level at (`x`, `y`) in its own texels, borders repeated; in the texels' units.
+#[inline(always)]
+fn bilinear<T: Channel>(image: &Image<[T; 3]>, x: f32, y: f32) -> [f32; 3] {
     let (width, texels) = (image.width(), image.pixels().as_flattened());
     let (column, s) = before(x, width);
     let (row, t) = before(y, image.height());
     let above = 3 * (row * width + column);
     let below = if image.height() > 1 { above + 3 * width } else { above };
-    // Two texels side by side are six numbers in a row: one check and two loads for both.
-    let pair = |start: usize| texels.get(start..start + 6).and_then(|pair| pair.first_chunk::<6>());
-    let (Some(above), Some(below), true) = (pair(above), pair(below), width > 1) else {
-        return narrow(image, row, t);
+    // Two texels side by side are six numbers in a row, eight fill a register: one check and one load for both.
+    let lanes = |start: usize| texels.get(start..start + 8).and_then(|lanes| lanes.first_chunk::<8>());
+    let (Some(above), Some(below), true) = (lanes(above), lanes(below), width > 1) else {
+        return bordering(image, [column, row], [s, t]);
     };
     // Plain loops: `map` over an array is not always inlined.
-    let mut columns = *above;
-    for k in 0..6 {
-        columns[k] += t * (below[k] - above[k]);
+    let mut columns = [0.0; 8];
+    for k in 0..8 {
+        let above = above[k].widened();
+        columns[k] = above + t * (below[k].widened() - above);
     }
     let mut out = [0.0; 3];
     for k in 0..3 {
@@ -129,11 +202,16 @@ fn bilinear(image: &Image<[f32; 3]>, x: f32, y: f32) -> [f32; 3] {
     out
 }
 
-/// Between `row` and the next in an image one texel wide; zero of an empty one.
+/// The same texel by texel: at the end of an image, in one that is one texel wide, in one without texels.
 #[cold]
-fn narrow(image: &Image<[f32; 3]>, row: usize, t: f32) -> [f32; 3] {
-    let Some(a) = image.pixels().get(row) else { return [0.0; 3] };
-    mixed(*a, *image.pixels().get(row + 1).unwrap_or(a), t)
+fn bordering<T: Channel>(image: &Image<[T; 3]>, [column, row]: [usize; 2], [s, t]: [f32; 2]) -> [f32; 3] {
+    if image.pixels().is_empty() {
+        return [0.0; 3];
+    }
+    let (right, down) = ((column + 1).min(image.width() - 1), (row + 1).min(image.height() - 1));
+    let texel = |x: usize, y: usize| image.at(x, y).map(T::widened);
+    let columns = [column, right].map(|x| mixed(texel(x, row), texel(x, down), t));
+    mixed(columns[0], columns[1], s)
 }
 
 /// `a` at `t = 0`, `b` at `t = 1`.
@@ -211,8 +289,34 @@ mod tests {
     }
 
     #[test]
+    fn quick_levels_are_levels() {
+        for i in 0..20_000 {
+            let footprint = 1.0005f32.powi(i) * 0.9;
+            let (quick, exact) = (quick_level_of_footprint(footprint), level_of_footprint(footprint));
+            assert!((quick - exact).abs() < 2e-5, "{quick} for {exact}");
+        }
+        for nothing in [f32::NAN, f32::NEG_INFINITY, -3.0, 0.0, 1.0] {
+            assert_eq!(quick_level_of_footprint(nothing), 0.0);
+        }
+    }
+
+    #[test]
+    fn fixed_point_is_as_near_as_it_says() {
+        let exact = pattern(37, 22, 0.0);
+        let fixed = exact.map(|p| p.map(|v| (v * FIXED_ONE).round() as i16));
+        let (a, b) = (MipChain::build(&exact, usize::MAX), MipChain::build(&fixed, usize::MAX));
+        for i in 0..400 {
+            let (x, y, level) = (i as f32 * 0.093, i as f32 * 0.055, i as f32 * 0.014);
+            let (p, q) = (a.sample(x, y, level), b.sample(x, y, level));
+            // Half a unit for the texels, half a unit for each reduction.
+            let bound = 0.5 * (1.0 + level.ceil()) / FIXED_ONE + 1e-4;
+            assert!((0..3).all(|c| (p[c] - q[c]).abs() < bound), "{p:?} {q:?} at level {level}");
+        }
+    }
+
+    #[test]
     fn nothing_panics_without_texels() {
-        let empty = Image::filled(0, 0, [0.0; 3]);
+        let empty: Image<[f32; 3]> = Image::filled(0, 0, [0.0; 3]);
         assert_eq!(MipChain::build(&empty, 4).sample(0.0, f32::NAN, 3.0), [0.0; 3]);
         let chain = Image::filled(1, 1, [1.0; 3]);
         assert_eq!(MipChain::build(&chain, 4).sample(f32::NAN, f32::INFINITY, 3.0).len(), 3);

@@ -4,6 +4,7 @@ use capture::Camera;
 use nalgebra::Point2;
 
 /// The pixel coordinates of sub-sample (`column`, `row`), counted over the whole frame.
+#[inline]
 pub(crate) fn sample_position(column: usize, row: usize, per_side: usize) -> Point2<f64> {
     let step = 1.0 / per_side as f64;
     Point2::new((column as f64 + 0.5) * step, (row as f64 + 0.5) * step)
@@ -29,6 +30,12 @@ impl Accumulator {
             self.sum[c] += colour[c];
         }
         self.covered += 1;
+    }
+
+    /// Whether no sub-sample is covered.
+    #[inline]
+    pub(crate) fn is_empty(&self) -> bool {
+        self.covered == 0
     }
 
     /// The pixel out of `samples` sub-samples; the only place where anything is clamped or rounded.

@@ -92,6 +92,11 @@ impl Samples {
         self.tiles_across * self.tiles_down
     }
 
+    /// How many tiles lie side by side.
+    pub(super) fn tiles_across(&self) -> usize {
+        self.tiles_across
+    }
+
     /// Pixel columns and rows of a tile.
     pub(super) fn tile_pixels(&self, tile: usize) -> (Range<usize>, Range<usize>) {
         let (x, y) = (tile % self.tiles_across * self.tile_px, tile / self.tiles_across * self.tile_px);
@@ -112,6 +117,21 @@ impl Samples {
         match &self.lens {
             None => sample_position(column, row, self.per_side).into(),
             Some(lens) => lens.ideal[row * self.intrinsics.width * self.per_side + column],
+        }
+    }
+
+    /// Ideal pixels of sub-samples side by side from (`column`, `row`) on.
+    #[inline(always)]
+    pub(super) fn positions(&self, column: usize, row: usize, xs: &mut [f64], ys: &mut [f64]) {
+        match &self.lens {
+            None => {
+                ys.fill(sample_position(column, row, self.per_side).y);
+                xs.iter_mut().enumerate().for_each(|(k, x)| *x = sample_position(column + k, row, self.per_side).x);
+            }
+            Some(lens) => {
+                let ideal = &lens.ideal[row * self.intrinsics.width * self.per_side + column..];
+                xs.iter_mut().zip(ys).zip(ideal).for_each(|((x, y), ideal)| [*x, *y] = *ideal);
+            }
         }
     }
 

@@ -5,10 +5,10 @@
 //! weights sum to `det / depth`, `det = a · (b × c)`. All three positive, after turning back faces
 //! over, means a hit in front of the camera wherever the corners themselves may lie.
 
+use super::Part;
 use crate::face::corners;
 use capture::{Camera, Intrinsics};
-use geometry::TexturedMesh;
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Point3, Vector3};
 use rayon::prelude::*;
 
 /// Air around a face's bounds, in pixels: more than rounding, less than matters.
@@ -26,9 +26,13 @@ pub(super) struct EdgeFace {
     pub(super) inverse_det: f64,
     /// Largest 1 / depth on the face; infinite where it reaches behind the camera.
     pub(super) nearest: f64,
+    /// Smallest 1 / depth on what of the face is in front of the camera.
+    pub(super) farthest: f64,
     /// Whether its outside is seen.
     pub(super) is_front: bool,
-    /// Index in the mesh.
+    /// The part it belongs to.
+    pub(super) part: u32,
+    /// Index in the part's mesh.
     pub(super) face: u32,
     /// Ideal pixels [x, y] that may be covered: lowest.
     pub(super) low: [f64; 2],
@@ -36,20 +40,40 @@ pub(super) struct EdgeFace {
     pub(super) high: [f64; 2],
 }
 
-/// Every face that may be seen, in the order of the mesh.
-pub(super) fn faces(mesh: &TexturedMesh, camera: &Camera) -> Vec<EdgeFace> {
-    (0..mesh.mesh.faces.len())
-        .into_par_iter()
-        .with_min_len(512)
-        .filter_map(|face| {
-            let positions = corners(mesh, face)?.positions.map(|p| camera.to_camera(&p));
-            edge_face(&positions, &camera.intrinsics, u32::try_from(face).ok()?)
-        })
-        .collect()
+/// Every face that may be seen, in the order of the parts and of their meshes.
+pub(super) fn faces(parts: &[Part<'_>], camera: &Camera) -> Vec<EdgeFace> {
+    let mut out = Vec::new();
+    for (index, part) in (0..).zip(parts) {
+        let to_camera = ToCamera::new(part, camera);
+        let faces = (0..part.mesh.mesh.faces.len()).into_par_iter().with_min_len(512).filter_map(|face| {
+            let positions = corners(part.mesh, face)?.positions.map(|p| to_camera.apply(&p));
+            let edges = edge_face(&positions, &camera.intrinsics)?;
+            Some(EdgeFace { part: index, face: u32::try_from(face).ok()?, ..edges })
+        });
+        out.par_extend(faces);
+    }
+    out
 }
 
-/// `None` behind the camera, and seen exactly edge-on.
-fn edge_face(corners: &[Vector3<f64>; 3], intrinsics: &Intrinsics, face: u32) -> Option<EdgeFace> {
+/// From a part's coordinates to the camera's.
+struct ToCamera {
+    linear: Matrix3<f64>,
+    translation: Vector3<f64>,
+}
+
+impl ToCamera {
+    fn new(part: &Part<'_>, camera: &Camera) -> Self {
+        let linear = camera.rotation * (part.pose.rotation * part.pose.scale);
+        Self { linear, translation: camera.rotation * part.pose.translation + camera.translation }
+    }
+
+    fn apply(&self, point: &Point3<f64>) -> Vector3<f64> {
+        self.linear * point.coords + self.translation
+    }
+}
+
+/// Of no part yet; `None` behind the camera, and seen exactly edge-on.
+fn edge_face(corners: &[Vector3<f64>; 3], intrinsics: &Intrinsics) -> Option<EdgeFace> {
     if corners.iter().all(|c| c.z <= 0.0) {
         return None;
     }
@@ -60,10 +84,12 @@ fn edge_face(corners: &[Vector3<f64>; 3], intrinsics: &Intrinsics, face: u32) ->
     let inverse_det = 1.0 / det.abs();
     let degenerate = !inverse_det.is_finite() || edges.iter().any(|e| e[0] == 0.0 && e[1] == 0.0 && e[2] <= 0.0);
     let (low, high) = bounds(corners, intrinsics);
-    let nearest = corners.iter().map(|c| if c.z > 0.0 { 1.0 / c.z } else { f64::INFINITY }).fold(0.0, f64::max);
+    let inverse_depths = corners.map(|c| if c.z > 0.0 { 1.0 / c.z } else { f64::INFINITY });
+    let (nearest, farthest) =
+        (inverse_depths.into_iter().fold(0.0, f64::max), inverse_depths.into_iter().fold(f64::INFINITY, f64::min));
     // Counter-clockwise from outside: the outward normal points at the eye.
     let is_front = det < 0.0;
-    (!degenerate).then_some(EdgeFace { edges, inverse_det, nearest, is_front, face, low, high })
+    (!degenerate).then_some(EdgeFace { edges, inverse_det, nearest, farthest, is_front, part: 0, face: 0, low, high })
 }
 
 /// `n · K⁻¹ (x, y, 1)`. Odd in `n` to the last bit, which makes shared edges watertight.

@@ -37,6 +37,7 @@ impl Nearest {
     ///
     /// Front faces go first. On a closed mesh they then hide nearly every back face, block by block,
     /// at a fraction of the cost of testing it.
+    #[inline(always)]
     pub(super) fn fill<'f>(
         &mut self,
         samples: &Samples,
@@ -54,12 +55,11 @@ impl Nearest {
         }
     }
 
-    /// Positions in the candidates of the faces nearest to the sub-samples `columns` of `row`, all
-    /// counted over the frame; [`NONE`] where there is none.
-    pub(super) fn slots(&self, columns: Range<usize>, row: usize) -> &[u32] {
-        let start = (row - self.patch.rows.start) * self.patch.columns.len();
-        let first = start + columns.start - self.patch.columns.start;
-        &self.slots[first..first + columns.len()]
+    /// Positions in the candidates of the faces nearest to the tile's sub-samples of `row`, counted over
+    /// the frame; [`NONE`] where there is none.
+    pub(super) fn slots(&self, row: usize) -> &[u32] {
+        let across = self.patch.columns.len();
+        &self.slots[(row - self.patch.rows.start) * across..][..across]
     }
 
     fn reset(&mut self, patch: Patch, per_side: usize) {
@@ -93,6 +93,7 @@ impl Nearest {
     }
 
     /// Whether all of `part` is known to lie in front of `face`.
+    #[inline(always)]
     fn hides(&self, part: &Patch, face: &EdgeFace) -> bool {
         if self.blocks.is_empty() {
             return false;
@@ -106,6 +107,7 @@ impl Nearest {
     }
 
     /// Puts a face in where it is nearest.
+    #[inline(always)]
     fn add(&mut self, face: &EdgeFace, slot: u32, samples: &Samples) {
         let patch = self.patch.clone();
         samples.visit(&patch, face, |part| {
@@ -121,6 +123,7 @@ impl Nearest {
     }
 
     /// Tests sub-samples on a regular grid, a few side by side.
+    #[inline(always)]
     fn cover_grid(&mut self, part: &Patch, face: &EdgeFace, slot: u32, per_side: usize) {
         let [e0, e1, e2] = &face.edges;
         let [t0, t1, t2] = [threshold(e0), threshold(e1), threshold(e2)];
@@ -151,6 +154,7 @@ impl Nearest {
     }
 
     /// Tests sub-samples that lie anywhere.
+    #[inline(always)]
     fn cover(&mut self, part: &Patch, face: &EdgeFace, slot: u32, samples: &Samples) {
         let thresholds = face.edges.map(|e| threshold(&e));
         let local = self.local(part);
