@@ -26,6 +26,51 @@ const HALVINGS: [f32; 64] = {
     scales
 };
 
+/// Eight numbers in a register: two texels side by side, and two numbers of the next.
+pub trait Eight: Copy {
+    /// From memory.
+    fn load(from: &[i16; 8]) -> Self;
+
+    /// `self` at `t = 0`, `to` at `t = 2^15`: `self + (to − self) t / 2^15`, rounded half up. Wraps where a difference
+    /// leaves 16 bits.
+    fn toward(self, to: Self, t: i16) -> Self;
+
+    /// The second texel in the place of the first.
+    fn second(self) -> Self;
+
+    /// The first texel, and a number more.
+    fn first(self) -> [i16; 4];
+}
+
+impl Eight for [i16; 8] {
+    #[inline(always)]
+    fn load(from: &[i16; 8]) -> Self {
+        *from
+    }
+
+    #[inline(always)]
+    fn toward(self, to: Self, t: i16) -> Self {
+        let mut out = self;
+        for k in 0..8 {
+            let product = i32::from(to[k].wrapping_sub(self[k])) * i32::from(t);
+            out[k] = out[k].wrapping_add((((product >> 14) + 1) >> 1) as i16);
+        }
+        out
+    }
+
+    #[inline(always)]
+    fn second(self) -> Self {
+        let [.., d, e, f, g, h] = self;
+        [d, e, f, g, h, 0, 0, 0]
+    }
+
+    #[inline(always)]
+    fn first(self) -> [i16; 4] {
+        let [a, b, c, d, ..] = self;
+        [a, b, c, d]
+    }
+}
+
 /// A channel of a texel: `f32` in levels of 0..=255, or `i16` in shares of one ([`FIXED_ONE`]).
 pub trait Channel: Copy + Default + Send + Sync + std::fmt::Debug + 'static {
     /// Levels of 0..=255 per unit.
@@ -34,8 +79,24 @@ pub trait Channel: Copy + Default + Send + Sync + std::fmt::Debug + 'static {
     /// As it is, in its own units.
     fn widened(self) -> f32;
 
+    /// Rounds to the nearest of 0..=255; NaN becomes 0.
+    fn rounded(self) -> u8;
+
     /// The mean of four; whole numbers round half up.
     fn mean(four: [Self; 4]) -> Self;
+
+    /// Two texels of two rows each, mixed: `s` across, `t` down. Of two such, `fine` and `coarse`, at `level` between
+    /// them. The fourth number is none.
+    fn mix<E: Eight>(fine: &Taps<'_, Self>, coarse: Option<(&Taps<'_, Self>, f32)>) -> [Self; 4];
+}
+
+/// What a lookup on one level reads: of two rows two texels side by side and two numbers of the next, and how far the place
+/// is on the way from the first to the second.
+#[derive(Clone, Copy, Debug)]
+pub struct Taps<'a, T> {
+    rows: [&'a [T; 8]; 2],
+    across: f32,
+    down: f32,
 }
 
 /// Binary places of a texel in fixed point, which so reaches from −1024 to 1023.97 levels of 0..=255.
@@ -53,11 +114,41 @@ impl Channel for f32 {
     }
 
     #[inline(always)]
+    fn rounded(self) -> u8 {
+        // A cast saturates, and truncates what is positive.
+        (self + 0.5) as u8
+    }
+
+    #[inline(always)]
     fn mean([a, b, c, d]: [Self; 4]) -> Self {
         0.25 * (a + b + c + d)
     }
+
+    #[inline(always)]
+    fn mix<E: Eight>(fine: &Taps<'_, Self>, coarse: Option<(&Taps<'_, Self>, f32)>) -> [Self; 4] {
+        let bilinear = |taps: &Taps<'_, Self>| {
+            // Plain loops: `map` over an array is not always inlined.
+            let (mut columns, mut out) = (*taps.rows[0], [0.0; 4]);
+            for k in 0..8 {
+                columns[k] += taps.down * (taps.rows[1][k] - columns[k]);
+            }
+            for k in 0..3 {
+                out[k] = columns[k] + taps.across * (columns[k + 3] - columns[k]);
+            }
+            out
+        };
+        let mut out = bilinear(fine);
+        if let Some((taps, share)) = coarse {
+            let coarse = bilinear(taps);
+            for k in 0..4 {
+                out[k] += share * (coarse[k] - out[k]);
+            }
+        }
+        out
+    }
 }
 
+/// Whole numbers all the way, the same on every machine; each of three steps rounds by 1/64 level at most.
 impl Channel for i16 {
     const LEVELS: f32 = 1.0 / FIXED_ONE;
 
@@ -67,9 +158,28 @@ impl Channel for i16 {
     }
 
     #[inline(always)]
+    fn rounded(self) -> u8 {
+        ((i32::from(self) + (1 << FIXED_PLACES >> 1)) >> FIXED_PLACES).clamp(0, 255) as u8
+    }
+
+    #[inline(always)]
     fn mean(four: [Self; 4]) -> Self {
         let [a, b, c, d] = four.map(i32::from);
         ((a + b + c + d + 2) >> 2) as Self
+    }
+
+    #[inline(always)]
+    fn mix<E: Eight>(fine: &Taps<'_, Self>, coarse: Option<(&Taps<'_, Self>, f32)>) -> [Self; 4] {
+        let share = |t: f32| (t * 32768.0) as Self;
+        let bilinear = |taps: &Taps<'_, Self>| {
+            let [above, below] = taps.rows.map(E::load);
+            let columns = above.toward(below, share(taps.down));
+            columns.toward(columns.second(), share(taps.across))
+        };
+        match coarse {
+            None => bilinear(fine).first(),
+            Some((taps, t)) => bilinear(fine).toward(bilinear(taps), share(t)).first(),
+        }
     }
 }
 
@@ -111,18 +221,34 @@ impl<'a, T: Channel> MipChain<'a, T> {
 
     /// The texture at (`x`, `y`) in texels of level 0, outer corner of the first texel (0, 0),
     /// filtered trilinearly for a fractional `level`; in levels of 0..=255. Zero of an empty atlas.
-    #[inline(always)]
     pub fn sample(&self, x: f32, y: f32, level: f32) -> [f32; 3] {
+        let [r, g, b, _] = self.look_up::<[i16; 8]>(x, y, level);
+        [r, g, b].map(|v| v.widened() * T::LEVELS)
+    }
+
+    /// The same in the texels' units. The fourth number is none.
+    #[inline(always)]
+    pub(crate) fn look_up<E: Eight>(&self, x: f32, y: f32, level: f32) -> [T; 4] {
         let level = level.min(self.reduced.len() as f32);
         // Also the way out for NaN.
         if level.is_nan() || level < MIN_LEVEL {
-            return bilinear(self.base, x, y).map(|v| v * T::LEVELS);
+            let place = Place::new(self.base, x, y);
+            return match place.taps(self.base) {
+                Some(taps) => T::mix::<E>(&taps, None),
+                None => mix_bordering::<T, E>([self.base; 2], [place; 2], 0.0),
+            };
         }
-        let fine = level as usize;
+        // Through i32: the conversion to 64 bit is slow.
+        let fine = level as i32 as usize;
         let scale = HALVINGS[fine.min(HALVINGS.len() - 1)];
-        let a = bilinear(self.level(fine), x * scale, y * scale);
-        let b = bilinear(self.level(fine + 1), x * scale * 0.5, y * scale * 0.5);
-        mixed(a, b, level - fine as f32).map(|v| v * T::LEVELS)
+        let images = [self.level(fine), self.level(fine + 1)];
+        let places =
+            [Place::new(images[0], x * scale, y * scale), Place::new(images[1], x * scale * 0.5, y * scale * 0.5)];
+        let share = level - fine as f32;
+        match (places[0].taps(images[0]), places[1].taps(images[1])) {
+            (Some(a), Some(b)) => T::mix::<E>(&a, Some((&b, share))),
+            _ => mix_bordering::<T, E>(images, places, share),
+        }
     }
 }
 
@@ -176,52 +302,64 @@ pub(crate) fn halve_row<T: Channel>(above: &[[T; 3]], below: &[[T; 3]], out: &mu
     }
 }
 
-/// One level at (`x`, `y`) in its own texels, borders repeated; in the texels' units.
-#[inline(always)]
-fn bilinear<T: Channel>(image: &Image<[T; 3]>, x: f32, y: f32) -> [f32; 3] {
-    let (width, texels) = (image.width(), image.pixels().as_flattened());
-    let (column, s) = before(x, width);
-    let (row, t) = before(y, image.height());
-    let above = 3 * (row * width + column);
-    let below = if image.height() > 1 { above + 3 * width } else { above };
-    // Two texels side by side are six numbers in a row, eight fill a register: one check and one load for both.
-    let lanes = |start: usize| texels.get(start..start + 8).and_then(|lanes| lanes.first_chunk::<8>());
-    let (Some(above), Some(below), true) = (lanes(above), lanes(below), width > 1) else {
-        return bordering(image, [column, row], [s, t]);
-    };
-    // Plain loops: `map` over an array is not always inlined.
-    let mut columns = [0.0; 8];
-    for k in 0..8 {
-        let above = above[k].widened();
-        columns[k] = above + t * (below[k].widened() - above);
-    }
-    let mut out = [0.0; 3];
-    for k in 0..3 {
-        out[k] = columns[k] + s * (columns[k + 3] - columns[k]);
-    }
-    out
+/// A place on one level: the texel whose centre lies before it, and how far it is on the way to the next.
+#[derive(Clone, Copy, Debug)]
+struct Place {
+    column: usize,
+    row: usize,
+    across: f32,
+    down: f32,
 }
 
-/// The same texel by texel: at the end of an image, in one that is one texel wide, in one without texels.
+impl Place {
+    /// (`x`, `y`) in the level's own texels; borders are repeated.
+    #[inline(always)]
+    fn new<T>(image: &Image<[T; 3]>, x: f32, y: f32) -> Self
+    where
+        T: Channel,
+    {
+        let (column, across) = before(x, image.width());
+        let (row, down) = before(y, image.height());
+        Self { column, row, across, down }
+    }
+
+    /// `None` where there are no two texels and two numbers more in both rows: at the end of an image, in one that is one
+    /// texel wide, in one without texels.
+    #[inline(always)]
+    fn taps<'a, T: Channel>(&self, image: &'a Image<[T; 3]>) -> Option<Taps<'a, T>> {
+        let (width, texels) = (image.width(), image.pixels().as_flattened());
+        let above = 3 * (self.row * width + self.column);
+        let below = if image.height() > 1 { above + 3 * width } else { above };
+        // Two texels side by side are six numbers in a row, eight fill a register: one check and one load for both.
+        let lanes = |start: usize| texels.get(start..start + 8).and_then(|lanes| lanes.first_chunk::<8>());
+        let rows = [lanes(above)?, lanes(below)?];
+        (width > 1).then_some(Taps { rows, across: self.across, down: self.down })
+    }
+
+    /// The same texel by texel.
+    fn gathered<T: Channel>(&self, image: &Image<[T; 3]>) -> [[T; 8]; 2] {
+        let row = |y: usize| {
+            let mut lanes = [T::default(); 8];
+            for (k, x) in [self.column, self.column + 1].into_iter().enumerate() {
+                let (x, y) = (x.min(image.width().saturating_sub(1)), y.min(image.height().saturating_sub(1)));
+                let texel = image.pixels().get(y * image.width() + x).copied().unwrap_or_default();
+                lanes[3 * k..3 * k + 3].copy_from_slice(&texel);
+            }
+            lanes
+        };
+        [row(self.row), row(self.row + 1)]
+    }
+}
+
+/// A lookup that touches the end of an image.
 #[cold]
-fn bordering<T: Channel>(image: &Image<[T; 3]>, [column, row]: [usize; 2], [s, t]: [f32; 2]) -> [f32; 3] {
-    if image.pixels().is_empty() {
-        return [0.0; 3];
-    }
-    let (right, down) = ((column + 1).min(image.width() - 1), (row + 1).min(image.height() - 1));
-    let texel = |x: usize, y: usize| image.at(x, y).map(T::widened);
-    let columns = [column, right].map(|x| mixed(texel(x, row), texel(x, down), t));
-    mixed(columns[0], columns[1], s)
-}
-
-/// `a` at `t = 0`, `b` at `t = 1`.
-#[inline]
-fn mixed(a: [f32; 3], b: [f32; 3], t: f32) -> [f32; 3] {
-    let mut out = a;
-    for k in 0..3 {
-        out[k] += t * (b[k] - a[k]);
-    }
-    out
+fn mix_bordering<T: Channel, E: Eight>(images: [&Image<[T; 3]>; 2], places: [Place; 2], share: f32) -> [T; 4] {
+    let rows = [places[0].gathered(images[0]), places[1].gathered(images[1])];
+    let taps = |k: usize| {
+        let [above, below] = &rows[k];
+        Taps { rows: [above, below], across: places[k].across, down: places[k].down }
+    };
+    T::mix::<E>(&taps(0), Some((&taps(1), share)))
 }
 
 /// The texel whose centre lies before `x` and how far `x` is on the way to the next. The last texel is
@@ -308,8 +446,8 @@ mod tests {
         for i in 0..400 {
             let (x, y, level) = (i as f32 * 0.093, i as f32 * 0.055, i as f32 * 0.014);
             let (p, q) = (a.sample(x, y, level), b.sample(x, y, level));
-            // Half a unit for the texels, half a unit for each reduction.
-            let bound = 0.5 * (1.0 + level.ceil()) / FIXED_ONE + 1e-4;
+            // Half a unit for the texels, for each reduction, and for each of three mixes.
+            let bound = 0.5 * (4.0 + level.ceil()) / FIXED_ONE + 1e-4;
             assert!((0..3).all(|c| (p[c] - q[c]).abs() < bound), "{p:?} {q:?} at level {level}");
         }
     }

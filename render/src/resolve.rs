@@ -1,5 +1,6 @@
 //! From sub-samples to a pixel: where samples lie, and how they are averaged.
 
+use crate::filter::Channel;
 use capture::Camera;
 use nalgebra::Point2;
 
@@ -48,7 +49,7 @@ impl Accumulator {
         let scale = 1.0 / samples as f32;
         let mut pixel = [255; 4];
         for c in 0..3 {
-            pixel[c] = to_u8((self.sum[c] + open * f32::from(background[c])) * scale);
+            pixel[c] = ((self.sum[c] + open * f32::from(background[c])) * scale).rounded();
         }
         pixel
     }
@@ -60,12 +61,6 @@ impl Accumulator {
         let scale = 1.0 / self.covered as f32;
         let [r, g, b] = self.sum;
         let alpha = 255.0 * self.covered as f32 / samples as f32;
-        [to_u8(r * scale), to_u8(g * scale), to_u8(b * scale), to_u8(alpha)]
+        [(r * scale).rounded(), (g * scale).rounded(), (b * scale).rounded(), alpha.rounded()]
     }
-}
-
-/// Rounds to the nearest of 0..=255; NaN becomes 0.
-fn to_u8(value: f32) -> u8 {
-    // A cast saturates, and truncates what is positive.
-    (value + 0.5) as u8
 }

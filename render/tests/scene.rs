@@ -2,12 +2,12 @@
 
 #![allow(clippy::unwrap_used, reason = "a helper that fails fails its test")]
 
-#[path = "support/models.rs"]
-mod models;
+#[path = "support/closed_forms.rs"]
+mod closed_forms;
 mod support;
 
 use capture::{Camera, Image};
-use models::{bumpy_ball, dyntex, lumigraph, still, vdtm};
+use closed_forms::{bumpy_ball, dyntex, lumigraph, still, vdtm};
 use nalgebra::{Point3, Rotation3, Vector3};
 use render::cpu::{Object, ScenePlayer};
 use render::material::Lighting;

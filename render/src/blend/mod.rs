@@ -7,7 +7,10 @@
 //! 2. layers stay the bytes they are in the file, laid out in the order in which they are read ([`pack`]), each facet with
 //!    as many layers as its rank; weights are rounded to 16 bits ([`weights`]);
 //! 3. multiply-adds of pairs on whatever vector unit there is ([`kernel`]), bit for bit the same on all;
-//! 4. reductions for the mip levels at once, block by block, while the texels are in the cache.
+//! 4. reductions for the mip levels at once, block by block, while the texels are in the cache. From the level where a block
+//!    is one texel, layers were reduced beforehand: the blend is linear, so the share each facet has in a block tells that
+//!    texel, for every block, at 1/128 of the cost. A sliver seen edge-on, whose lookups reach over half the atlas, so
+//!    asks for no more blocks than its neighbours.
 //!
 //! A texel of the result is a number in shares of 1/32 level, from −1024 to 1024: bases overshoot 0..=255 and filters must
 //! see it. Against [`texture::Model::atlas`] it is off by 1/64 for its own rounding and by what [`weights`] rounds, together
@@ -24,7 +27,7 @@ mod weights;
 
 pub use wanted::Wanted;
 
-use crate::filter::{MipChain, halve_row, top_level};
+use crate::filter::{FIXED_ONE, MipChain, halve_row, top_level};
 use crate::simd::Level;
 use capture::Image;
 use nalgebra::Point3;
@@ -128,7 +131,15 @@ impl<'a> Blender<'a> {
         [self.base.width(), self.base.height()]
     }
 
-    /// Makes what is `wanted` what `eye`, in the model's coordinates, sees. `wanted` must be of this atlas' size.
+    /// What to write down for [`Blender::blend`].
+    pub fn wanted(&self) -> Wanted {
+        match self.source {
+            Source::Layers(_) => Wanted::up_to(BLOCK_LEVEL - 1, self.size()),
+            Source::Rays(_) => Wanted::none(self.size()),
+        }
+    }
+
+    /// Makes what is `wanted` what `eye`, in the model's coordinates, sees. `wanted` must be this blender's.
     pub fn blend(&mut self, eye: &Point3<f64>, wanted: &Wanted) {
         self.frame += 1;
         let top = wanted.top().min(self.reduced.len());
@@ -137,8 +148,12 @@ impl<'a> Blender<'a> {
             Source::Rays(rays) => rays.blend(eye, wanted),
         }
         let (source, frame) = (&self.source, self.frame);
-        let strips = strips(&mut self.base, &mut self.reduced, &mut self.blocks, top);
+        let finest = if matches!(source, Source::Layers(_)) { BLOCK_LEVEL - 1 } else { BLOCK_LEVEL };
+        let strips = strips(&mut self.base, &mut self.reduced, &mut self.blocks, top.min(finest));
         self.bytes = strips.into_par_iter().map(|strip| source.fill(strip, wanted, frame)).sum();
+        if let (Source::Layers(source), true) = (&self.source, top >= BLOCK_LEVEL) {
+            source.reduce(&mut self.reduced[BLOCK_LEVEL - 1]);
+        }
         for level in BLOCK_LEVEL + 1..=top {
             let (fine, coarse) = self.reduced.split_at_mut(level - 1);
             halve(&fine[level - 2], &mut coarse[0]);
@@ -161,7 +176,7 @@ impl<'a> Blender<'a> {
     }
 }
 
-/// Rows of blocks, each with its part of the levels 0..=`top` (of those with whole texels of a block).
+/// Rows of blocks, each with its part of the levels 0..=`top`, on all of which a block has whole texels.
 fn strips<'a>(
     base: &'a mut Image<[i16; 3]>,
     reduced: &'a mut [Image<[i16; 3]>],
@@ -171,7 +186,7 @@ fn strips<'a>(
     let across = base.width().div_ceil(BLOCK).max(1);
     let strip = |(row, blocks)| Strip { row, levels: Vec::with_capacity(1 + BLOCK_LEVEL), blocks };
     let mut strips: Vec<Strip<'a>> = blocks.chunks_mut(across).enumerate().map(strip).collect();
-    let levels = std::iter::once(base).chain(reduced).take(1 + top.min(BLOCK_LEVEL));
+    let levels = std::iter::once(base).chain(reduced).take(1 + top);
     for (level, image) in levels.enumerate() {
         let width = image.width();
         let parts = image.pixels_mut().chunks_mut(width.max(1) * (BLOCK >> level));
@@ -217,7 +232,9 @@ impl Source<'_> {
 impl LayerSource<'_> {
     /// Finds the weights of the facets in the wanted blocks.
     fn weigh(&mut self, eye: &Point3<f64>, wanted: &Wanted, frame: u64) {
-        self.facets.iter_mut().for_each(|facet| facet.is_wanted = false);
+        // Coarse levels show them all.
+        let are_all_wanted = wanted.top() >= BLOCK_LEVEL;
+        self.facets.iter_mut().for_each(|facet| facet.is_wanted = are_all_wanted);
         for (_, chunks) in self.packed.blocks.iter().enumerate().filter(|(block, _)| wanted.holds(*block)) {
             chunks.iter().for_each(|chunk| self.facets[chunk.facet as usize].is_wanted = true);
         }
@@ -229,6 +246,20 @@ impl LayerSource<'_> {
                 std::mem::swap(weights, &mut state.weights);
                 state.changed = frame;
             }
+        });
+    }
+
+    /// The level where a block is one texel.
+    fn reduce(&self, texels: &mut Image<[i16; 3]>) {
+        let texels = texels.pixels_mut().par_iter_mut().zip(&self.packed.blocks).with_min_len(64);
+        texels.for_each(|(texel, chunks)| {
+            let mut sum = [0.0; 3];
+            for chunk in chunks {
+                let part = self.facets[chunk.facet as usize].weights.apply(&chunk.means, chunk.share);
+                (0..3).for_each(|c| sum[c] += part[c]);
+            }
+            // Casts saturate.
+            *texel = sum.map(|s: f32| (s * FIXED_ONE).round_ties_even() as i16);
         });
     }
 

@@ -4,7 +4,7 @@
 //! channel of a texel) after 32; of these, the layers two by two. So one line of cache holds 32 values of two layers, side
 //! by side as the multiply-add of pairs of all vector units wants them. No byte is read that the facet's rank does not ask for.
 
-use super::wanted::BLOCK;
+use super::wanted::{BLOCK, BLOCK_LEVEL};
 use texture::Layers;
 
 /// Values blended side by side.
@@ -27,7 +27,7 @@ pub(super) struct Run {
 }
 
 /// The texels of a block that belong to one facet.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Chunk {
     pub(super) facet: u32,
     /// Where its texels lie, in the order of its values.
@@ -35,6 +35,10 @@ pub(super) struct Chunk {
     /// Its first line, and how many.
     pub(super) first: usize,
     pub(super) count: usize,
+    /// Its share of the block, as reductions to one texel weigh it.
+    pub(super) share: f32,
+    /// Of each layer, its part of that texel: `Σ weight · (texel − 128)`.
+    pub(super) means: Vec<[f32; 3]>,
 }
 
 /// All layers.
@@ -51,32 +55,63 @@ impl Packed {
         let (across, down) = (map.width().div_ceil(BLOCK), map.height().div_ceil(BLOCK));
         let mut packed = Self { blocks: Vec::with_capacity(across * down), lines: Vec::new() };
         for (by, bx) in (0..down).flat_map(|by| (0..across).map(move |bx| (by, bx))) {
-            let chunks = chunks(layers, bx, by).into_iter().map(|chunk| packed.put(layers, by, chunk)).collect();
+            let reduction = [reduction(map.width() - bx * BLOCK), reduction(map.height() - by * BLOCK)];
+            let put = |chunk| packed.put(layers, [bx, by], chunk, &reduction);
+            let chunks = chunks(layers, bx, by).into_iter().map(put).collect();
             packed.blocks.push(chunks);
         }
         packed
     }
 
-    fn put(&mut self, layers: &Layers, block_row: usize, mut chunk: Chunk) -> Chunk {
+    fn put(
+        &mut self,
+        layers: &Layers,
+        [bx, by]: [usize; 2],
+        mut chunk: Chunk,
+        [columns, rows]: &[[f32; BLOCK]; 2],
+    ) -> Chunk {
         let rank = layers.facets[chunk.facet as usize].rank.min(layers.layers.len());
-        let texels: usize = chunk.runs.iter().map(|run| usize::from(run.length)).sum();
-        let (pairs, groups) = (rank.div_ceil(2), (3 * texels).div_ceil(VALUES));
+        let places = chunk.runs.iter().flat_map(|run| {
+            let first = run.column as usize;
+            (first..first + usize::from(run.length)).map(|column| [column, usize::from(run.row)])
+        });
+        let places: Vec<[usize; 2]> = places.collect();
+        let weight = |&[column, row]: &[usize; 2]| columns[column - bx * BLOCK] * rows[row];
+        let (pairs, groups) = (rank.div_ceil(2), (3 * places.len()).div_ceil(VALUES));
         chunk.first = self.lines.len();
         chunk.count = pairs * groups;
+        chunk.share = places.iter().map(weight).sum();
         self.lines.resize(chunk.first + chunk.count, Line([0; 2 * VALUES]));
         let lines = &mut self.lines[chunk.first..];
         for (k, layer) in layers.layers[..rank].iter().enumerate() {
-            let values = chunk.runs.iter().flat_map(|run| {
-                let row = layer.texels.row(block_row * BLOCK + usize::from(run.row));
-                &row.as_flattened()[3 * run.column as usize..][..3 * usize::from(run.length)]
-            });
-            for (i, &value) in values.enumerate() {
-                let line = i / VALUES * pairs + k / 2;
-                lines[line].0[2 * (i % VALUES) + k % 2] = (value ^ 0x80).cast_signed();
+            let mut mean = [0.0; 3];
+            for (t, place) in places.iter().enumerate() {
+                let texel = layer.texels.at(place[0], by * BLOCK + place[1]).map(|v| (v ^ 0x80).cast_signed());
+                for (c, value) in texel.into_iter().enumerate() {
+                    let i = 3 * t + c;
+                    lines[i / VALUES * pairs + k / 2].0[2 * (i % VALUES) + k % 2] = value;
+                    mean[c] += weight(place) * f32::from(value);
+                }
             }
+            chunk.means.push(mean);
         }
         chunk
     }
+}
+
+/// What each of `left` texels side by side (of at most a block) weighs when they are halved to one, a last one without
+/// a pair being repeated.
+fn reduction(left: usize) -> [f32; BLOCK] {
+    let length = left.min(BLOCK);
+    let weight = |of: usize| {
+        let mut line = vec![0.0; length];
+        line[of] = 1.0;
+        for _ in 0..BLOCK_LEVEL {
+            line = line.chunks(2).map(|pair| 0.5 * (pair[0] + pair[pair.len() - 1])).collect();
+        }
+        line[0]
+    };
+    std::array::from_fn(|of| if of < length { weight(of) } else { 0.0 })
 }
 
 /// The facets of a block in the order in which they first come, with their runs.
@@ -92,7 +127,7 @@ fn chunks(layers: &Layers, bx: usize, by: usize) -> Vec<Chunk> {
             column += same.len();
             match chunks.iter_mut().find(|chunk| chunk.facet == facet) {
                 Some(chunk) => chunk.runs.push(run),
-                None => chunks.push(Chunk { facet, runs: vec![run], first: 0, count: 0 }),
+                None => chunks.push(Chunk { facet, runs: vec![run], ..Chunk::default() }),
             }
         }
     }

@@ -11,7 +11,7 @@
 use super::Rows;
 use super::wanted::{BLOCK, Wanted};
 use crate::filter::FIXED_ONE;
-use crate::simd::{Level, Work};
+use crate::simd::{Lanes, Level, Work};
 use capture::Image;
 use geometry::atlas::PushPull;
 use nalgebra::{Point3, Vector3};
@@ -124,7 +124,7 @@ struct Row<'a> {
 
 impl Work for Row<'_> {
     #[inline(always)]
-    fn run(self) {
+    fn run<E: Lanes>(self) {
         let width = self.texels.len();
         let blocks = self.y / BLOCK * width.div_ceil(BLOCK);
         let mut penalties = vec![0.0; self.rays.rays.rays];
@@ -164,18 +164,17 @@ impl Rays<'_> {
     /// The colour of a texel by the squared penalties of its rays; `None` without rays.
     #[inline(always)]
     fn mix(&self, texel: usize, penalties: &[f32]) -> Option<[f32; 3]> {
-        // Nearest first, one more than is blended: the last one is the threshold.
-        let mut nearest = [(NOWHERE, 0); BLENDED + 1];
-        for (k, &penalty) in penalties.iter().enumerate() {
-            if penalty < nearest[BLENDED].0 {
-                nearest[BLENDED] = (penalty, k);
-                for i in (0..BLENDED).rev() {
-                    if nearest[i + 1].0 < nearest[i].0 {
-                        nearest.swap(i, i + 1);
-                    }
-                }
+        // Nearest first, one more than is blended: the last one is the threshold. Penalties are not negative, so their
+        // bits order as they do; the ray's number below them keeps the first of equals first.
+        let mut nearest = [u64::MAX; BLENDED + 1];
+        for (k, penalty) in (0u64..).zip(penalties) {
+            let mut key = u64::from(penalty.to_bits()) << 32 | k;
+            for place in &mut nearest {
+                (*place, key) = ((*place).min(key), (*place).max(key));
             }
         }
+        let nearest = nearest.map(|key| (f32::from_bits((key >> 32) as u32), key as u32 as usize));
+        // What is left of the start is not a number.
         let found = nearest.iter().filter(|n| n.0 < NOWHERE).count();
         let last = nearest.get(found.checked_sub(1)?)?.0.sqrt();
         let threshold = if found > BLENDED { last } else { 1.01 * last } + 1e-12;

@@ -119,7 +119,10 @@ fn mip_levels_are_those_of_the_texture() {
             let expected = crate::filter::MipChain::build(blender.texels(), 20);
             let chain = blender.chain(&wanted);
             for level in 0..=7 {
-                assert!(chain.level(level) == expected.level(level), "level {level} of {size:?}");
+                let pairs = chain.level(level).pixels().iter().zip(expected.level(level).pixels());
+                let apart = pairs.flat_map(|(a, b)| (0..3).map(|c| a[c].abs_diff(b[c]))).max().unwrap();
+                // Coarse levels are blended of reduced layers, the others reduced step by step: in half units each.
+                assert!(apart <= if level < 4 { 0 } else { 5 }, "level {level} of {size:?} is {apart} units apart");
             }
         }
     }

@@ -13,16 +13,23 @@ pub(super) const BLOCK_LEVEL: usize = 4;
 #[derive(Debug)]
 pub struct Wanted {
     size: [usize; 2],
+    /// Lookups on coarser levels than this reach no blocks: these levels are made without them.
+    coarsest: usize,
     blocks: Vec<AtomicBool>,
     top: AtomicUsize,
 }
 
 impl Wanted {
-    /// Nothing, of an atlas of this width and height.
-    pub fn none([width, height]: [usize; 2]) -> Self {
+    /// Nothing, of an atlas of this width and height of which every level is made from its texels.
+    pub fn none(size: [usize; 2]) -> Self {
+        Self::up_to(usize::MAX, size)
+    }
+
+    /// Nothing, of an atlas of which the texels make the levels up to `coarsest`.
+    pub(super) fn up_to(coarsest: usize, [width, height]: [usize; 2]) -> Self {
         let count = width.div_ceil(BLOCK) * height.div_ceil(BLOCK);
         let blocks = std::iter::repeat_with(|| AtomicBool::new(false)).take(count).collect();
-        Self { size: [width, height], blocks, top: AtomicUsize::new(0) }
+        Self { size: [width, height], coarsest, blocks, top: AtomicUsize::new(0) }
     }
 
     /// Everything, up to mip level `top`.
@@ -43,7 +50,7 @@ impl Wanted {
     /// l, centres are 2^l apart and a lookup reaches to the next one, so texels reach 1.5 · 2^l far. NaN marks all.
     pub fn mark(&self, low: [f64; 2], high: [f64; 2], level: usize) {
         self.top.fetch_max(level, Ordering::Relaxed);
-        let reach = 1.5 * (1u64 << level.min(40)) as f64;
+        let reach = 1.5 * (1u64 << level.min(self.coarsest).min(40)) as f64;
         let blocks = |k: usize| {
             let count = self.size[k].div_ceil(BLOCK);
             // Lookups beyond the border repeat it; casts saturate and take NaN to 0.

@@ -49,4 +49,15 @@ impl Weights {
             self.pairs[k / 2][k % 2] = (g * one).round() as i16;
         }
     }
+
+    /// The weight of layer `k` times `of`, summed over the layers, and the base times `share`: in levels of 0..=255.
+    pub(super) fn apply(&self, of: &[[f32; 3]], share: f32) -> [f32; 3] {
+        let one = (1u32 << (self.shift + FIXED_PLACES)) as f32;
+        let mut sum = [share * (self.base - ((1 << self.shift) >> 1)) as f32; 3];
+        for (k, value) in of.iter().enumerate() {
+            let weight = f32::from(self.pairs[k / 2][k % 2]);
+            (0..3).for_each(|c| sum[c] += weight * value[c]);
+        }
+        sum.map(|s| s / one)
+    }
 }

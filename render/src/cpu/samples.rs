@@ -140,13 +140,17 @@ impl Samples {
         self.lens.is_none()
     }
 
-    /// Visits the rectangles of `patch` that a face may cover.
+    /// The sub-samples of `patch` that a face may cover, on a regular grid.
+    #[inline(always)]
+    pub(super) fn box_of(&self, patch: &Patch, face: &EdgeFace) -> Patch {
+        let columns = self.reached(face.low[0], face.high[0], &patch.columns);
+        let rows = self.reached(face.low[1], face.high[1], &patch.rows);
+        Patch { columns, rows }
+    }
+
+    /// Visits the blocks of `patch` that a face may cover, under a lens.
     pub(super) fn visit(&self, patch: &Patch, face: &EdgeFace, mut visit: impl FnMut(Patch)) {
-        let Some(lens) = &self.lens else {
-            let columns = self.reached(face.low[0], face.high[0], &patch.columns);
-            let rows = self.reached(face.low[1], face.high[1], &patch.rows);
-            return visit(Patch { columns, rows });
-        };
+        let Some(lens) = &self.lens else { return };
         let blocks = |range: &Range<usize>| range.start / BLOCK_SAMPLES..range.end.div_ceil(BLOCK_SAMPLES);
         let inside = |block: usize, range: &Range<usize>| {
             (block * BLOCK_SAMPLES).max(range.start)..((block + 1) * BLOCK_SAMPLES).min(range.end)
@@ -161,6 +165,7 @@ impl Samples {
     }
 
     /// Sub-samples on a regular grid between two pixel coordinates, within `range`.
+    #[inline(always)]
     fn reached(&self, low: f64, high: f64, range: &Range<usize>) -> Range<usize> {
         let n = self.per_side as f64;
         // Casts saturate: the infinite bounds of a face behind the camera give the whole range.

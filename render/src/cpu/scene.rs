@@ -52,7 +52,7 @@ impl<'a> ScenePlayer<'a> {
     pub fn new(objects: &[Object<'a>], options: RenderOptions) -> Self {
         let actor = |object: &Object<'a>| {
             let blender = Blender::new(object.model);
-            let wanted = Wanted::none(blender.size());
+            let wanted = blender.wanted();
             let Object { model, pose, coats } = *object;
             Actor { mesh: &model.mesh, pose, coats, blender, wanted, lighting: Lighting::default() }
         };

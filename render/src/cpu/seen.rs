@@ -6,7 +6,7 @@ use super::setup::{EdgeFace, Linear};
 use super::visibility::{NONE, Nearest};
 use crate::face::corners;
 use crate::filter::level_of_footprint;
-use crate::simd::Work;
+use crate::simd::{Lanes, Work};
 
 /// Sub-samples looked up side by side.
 pub(super) const SPAN: usize = 64;
@@ -52,14 +52,14 @@ pub(super) struct Find<'a> {
 
 impl Work for Find<'_> {
     #[inline(always)]
-    fn run(self) {
+    fn run<E: Lanes>(self) {
         self.seen.runs.clear();
         self.seen.surfaces.clear();
         if self.candidates.is_empty() {
             return;
         }
         let faces = self.candidates.iter().map(|&index| &self.geometry.faces[index as usize]);
-        self.nearest.fill(self.geometry.samples, self.tile, faces);
+        self.nearest.fill::<E>(self.geometry.samples, self.tile, faces);
         self.seen.collect(self.geometry, self.tile, self.candidates, self.nearest);
     }
 }
@@ -72,20 +72,20 @@ impl Seen {
         self.made.clear();
         self.made.resize(candidates.len(), NONE);
         for row in patch.rows.clone() {
-            let mut column = patch.columns.start;
-            for same in nearest.slots(row).chunk_by(|a, b| a == b) {
-                let (start, slot) = (column, same[0]);
-                column += same.len();
-                if slot == NONE {
-                    continue;
+            let slots = nearest.slots(row);
+            let mut start = 0;
+            while start < slots.len() {
+                let slot = slots[start];
+                let length = same(&slots[start..], slot);
+                if slot != NONE
+                    && let Some(surface) = self.surface(geometry, &patch, slot as usize, candidates[slot as usize])
+                {
+                    for first in (start..start + length).step_by(SPAN) {
+                        let (column, length) = (patch.columns.start + first, (start + length - first).min(SPAN));
+                        self.runs.push(Run { row: row as u32, column: column as u32, length: length as u16, surface });
+                    }
                 }
-                let Some(surface) = self.surface(geometry, &patch, slot as usize, candidates[slot as usize]) else {
-                    continue;
-                };
-                for (k, part) in same.chunks(SPAN).enumerate() {
-                    let (column, length) = ((start + k * SPAN) as u32, part.len() as u16);
-                    self.runs.push(Run { row: row as u32, column, length, surface });
-                }
+                start += length;
             }
         }
     }
@@ -98,6 +98,14 @@ impl Seen {
         }
         Some(self.made[slot])
     }
+}
+
+/// How many of `slots` are `slot`, from the first on, which is.
+#[inline(always)]
+fn same(slots: &[u32], slot: u32) -> usize {
+    // Eight at a time is one comparison.
+    let whole = slots.as_chunks::<8>().0.iter().take_while(|eight| **eight == [slot; 8]).count();
+    8 * whole + slots[8 * whole..].iter().take_while(|&&s| s == slot).count()
 }
 
 impl Geometry<'_> {

@@ -6,7 +6,7 @@
 //! over, means a hit in front of the camera wherever the corners themselves may lie.
 
 use super::Part;
-use crate::face::corners;
+use crate::face::vertex;
 use capture::{Camera, Intrinsics};
 use nalgebra::{Matrix3, Point3, Vector3};
 use rayon::prelude::*;
@@ -45,9 +45,14 @@ pub(super) fn faces(parts: &[Part<'_>], camera: &Camera) -> Vec<EdgeFace> {
     let mut out = Vec::new();
     for (index, part) in (0..).zip(parts) {
         let to_camera = ToCamera::new(part, camera);
-        let faces = (0..part.mesh.mesh.faces.len()).into_par_iter().with_min_len(512).filter_map(|face| {
-            let positions = corners(part.mesh, face)?.positions.map(|p| to_camera.apply(&p));
-            let edges = edge_face(&positions, &camera.intrinsics)?;
+        let mesh = &part.mesh.mesh;
+        // A vertex has six faces.
+        let place = |v: usize| vertex(part.mesh, v).map(|(position, _)| to_camera.apply(&position));
+        let vertices: Vec<Option<Vector3<f64>>> =
+            (0..mesh.positions.len()).into_par_iter().with_min_len(1024).map(place).collect();
+        let faces = mesh.faces.par_iter().with_min_len(512).enumerate().filter_map(|(face, corners)| {
+            let [a, b, c] = corners.map(|v| vertices.get(v as usize).copied().flatten());
+            let edges = edge_face(&[a?, b?, c?], &camera.intrinsics)?;
             Some(EdgeFace { part: index, face: u32::try_from(face).ok()?, ..edges })
         });
         out.par_extend(faces);
