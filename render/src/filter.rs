@@ -170,7 +170,8 @@ impl Channel for i16 {
 
     #[inline(always)]
     fn mix<E: Eight>(fine: &Taps<'_, Self>, coarse: Option<(&Taps<'_, Self>, f32)>) -> [Self; 4] {
-        let share = |t: f32| (t * 32768.0) as Self;
+        // Through 32 bits, which saturates where it cannot matter.
+        let share = |t: f32| (t * f32::from(Self::MAX)) as i32 as Self;
         let bilinear = |taps: &Taps<'_, Self>| {
             let [above, below] = taps.rows.map(E::load);
             let columns = above.toward(below, share(taps.down));
@@ -229,7 +230,7 @@ impl<'a, T: Channel> MipChain<'a, T> {
     /// The same in the texels' units. The fourth number is none.
     #[inline(always)]
     pub(crate) fn look_up<E: Eight>(&self, x: f32, y: f32, level: f32) -> [T; 4] {
-        let level = level.min(self.reduced.len() as f32);
+        let level = level.min(self.reduced.len() as i32 as f32);
         // Also the way out for NaN.
         if level.is_nan() || level < MIN_LEVEL {
             let place = Place::new(self.base, x, y);
@@ -238,13 +239,12 @@ impl<'a, T: Channel> MipChain<'a, T> {
                 None => mix_bordering::<T, E>([self.base; 2], [place; 2], 0.0),
             };
         }
-        // Through i32: the conversion to 64 bit is slow.
         let fine = level as i32 as usize;
         let scale = HALVINGS[fine.min(HALVINGS.len() - 1)];
         let images = [self.level(fine), self.level(fine + 1)];
         let places =
             [Place::new(images[0], x * scale, y * scale), Place::new(images[1], x * scale * 0.5, y * scale * 0.5)];
-        let share = level - fine as f32;
+        let share = level - fine as i32 as f32;
         match (places[0].taps(images[0]), places[1].taps(images[1])) {
             (Some(a), Some(b)) => T::mix::<E>(&a, Some((&b, share))),
             _ => mix_bordering::<T, E>(images, places, share),
@@ -366,10 +366,11 @@ fn mix_bordering<T: Channel, E: Eight>(images: [&Image<[T; 3]>; 2], places: [Pla
 /// reached as the next of the one before it.
 #[inline]
 fn before(x: f32, size: usize) -> (usize, f32) {
-    let x = (x - 0.5).max(0.0).min(size.saturating_sub(1) as f32);
-    // Through i32: the conversion to 64 bit is slow.
-    let first = (x as i32 as usize).min(size.saturating_sub(2));
-    (first, x - first as f32)
+    // In 32 bits, which no image's side leaves: conversions from and to 64 are slow.
+    let last = size as i32 - 1;
+    let x = (x - 0.5).max(0.0).min(last.max(0) as f32);
+    let first = (x as i32).min((last - 1).max(0));
+    (first as usize, x - first as f32)
 }
 
 #[cfg(test)]

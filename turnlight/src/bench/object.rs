@@ -11,8 +11,8 @@ use texture::{Appearance, FacetWeights, Layer, Layers, Method, Model};
 const ATLAS: usize = 512;
 /// Layers, the mean among them.
 const LAYERS: usize = 20;
-/// Quads along a side of the six charts: 10 092 triangles.
-const QUADS: usize = 29;
+/// Quads along a side of the six charts: 4800 triangles.
+const QUADS: usize = 20;
 /// Free texels around each chart.
 const GAP: f64 = 3.0;
 /// Texels along a side of a facet.
