@@ -41,6 +41,7 @@ use geometry::TexturedMesh;
 use rayon::prelude::*;
 use samples::Samples;
 use seen::{Find, Geometry, Seen};
+use setup::Faces;
 use shade::{Look, Shading};
 use std::time::{Duration, Instant};
 use visibility::Nearest;
@@ -71,7 +72,8 @@ struct Canvas {
     options: RenderOptions,
     level: Level,
     samples: Option<Samples>,
-    /// Kept for their memory alone.
+    /// Kept for their memory alone, as what tiles see.
+    faces: Faces,
     tiles: Vec<Seen>,
     times: StageTimes,
 }
@@ -149,7 +151,7 @@ impl<'a> Player<'a> {
 impl Canvas {
     fn new(options: RenderOptions) -> Self {
         let (level, times) = (Level::widest(), StageTimes::default());
-        Self { options, level, samples: None, tiles: Vec::new(), times }
+        Self { options, level, samples: None, faces: Faces::default(), tiles: Vec::new(), times }
     }
 
     /// Draws `parts`; `looks`, one per part, are asked for when it is known what they must hold. `frame` is kept for its
@@ -177,16 +179,17 @@ impl Canvas {
             _ => Samples::new(camera, n),
         };
         let samples = &*self.samples.insert(samples);
-        let faces = setup::faces(parts, camera);
-        let bins = samples.bin(&faces);
+        self.faces.set_up(parts, camera, samples);
+        let faces = &self.faces;
         let binned = Instant::now();
-        let geometry = Geometry { samples, parts, faces: &faces };
+        let geometry = Geometry { samples, parts, faces };
         self.tiles.resize_with(samples.tiles(), Seen::default);
         let level = self.level;
-        let find = |nearest: &mut Nearest, (tile, seen): (usize, &mut Seen)| {
-            level.run(Find { geometry: &geometry, tile, candidates: bins.of(tile), nearest, seen });
-        };
-        self.tiles.par_iter_mut().enumerate().for_each_init(Nearest::default, find);
+        self.tiles.par_iter_mut().enumerate().for_each_init(Default::default, |state, (tile, seen)| {
+            let (nearest, candidates): &mut (Nearest, Vec<u32>) = state;
+            faces.gather(tile, candidates);
+            level.run(Find { geometry: &geometry, tile, candidates, nearest, seen });
+        });
         let found = Instant::now();
         let looks = looks();
         let blended = Instant::now();

@@ -15,7 +15,7 @@ pub(super) const BLOCK_SAMPLES: usize = 8;
 
 /// A box on the ideal plane; empty where nothing was put in.
 #[derive(Clone, Copy, Debug)]
-struct Bounds {
+pub(super) struct Bounds {
     low: [f64; 2],
     high: [f64; 2],
 }
@@ -49,16 +49,40 @@ pub(super) struct Samples {
 }
 
 /// Which faces each tile may see, in the order of the faces.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct Bins {
-    starts: Vec<usize>,
+    /// Of each tile, and the end; none without faces.
+    starts: Vec<u32>,
     faces: Vec<u32>,
+    /// Tiles and faces as they come; kept for its memory alone.
+    pairs: Vec<[u32; 2]>,
 }
 
 impl Bins {
     /// Indices into the faces that were binned.
     pub(super) fn of(&self, tile: usize) -> &[u32] {
-        &self.faces[self.starts[tile]..self.starts[tile + 1]]
+        let (Some(&start), Some(&end)) = (self.starts.get(tile), self.starts.get(tile + 1)) else { return &[] };
+        &self.faces[start as usize..end as usize]
+    }
+
+    /// Sorts the pairs by tile, of `tiles`; those of a tile stay in their order.
+    fn sort(&mut self, tiles: usize) {
+        self.starts.clear();
+        self.starts.resize(tiles + 1, 0);
+        // One place further on, so that each start is where the next face of its tile goes, and in the end its end.
+        self.pairs.iter().filter(|[tile, _]| (*tile as usize) + 2 <= tiles).for_each(|[tile, _]| {
+            self.starts[*tile as usize + 2] += 1;
+        });
+        for tile in 2..=tiles {
+            self.starts[tile] += self.starts[tile - 1];
+        }
+        self.faces.clear();
+        self.faces.resize(self.pairs.len(), 0);
+        for &[tile, face] in &self.pairs {
+            let slot = &mut self.starts[tile as usize + 1];
+            self.faces[*slot as usize] = face;
+            *slot += 1;
+        }
     }
 }
 
@@ -174,28 +198,21 @@ impl Samples {
         first..last.clamp(first, range.end)
     }
 
-    /// Sorts faces into tiles.
-    pub(super) fn bin(&self, faces: &[EdgeFace]) -> Bins {
-        let bounds: Vec<Bounds> = match &self.lens {
+    /// Sorts faces into tiles, of which a lens needs the bounds.
+    pub(super) fn bin(&self, faces: &[EdgeFace], bounds: &[Bounds], bins: &mut Bins) {
+        bins.pairs.clear();
+        for (index, face) in (0..).zip(faces) {
+            self.tiles_of(face, bounds, |tile| bins.pairs.push([tile as u32, index]));
+        }
+        bins.sort(self.tiles());
+    }
+
+    /// Where the sub-samples of each tile lie under a lens; nothing without.
+    pub(super) fn tile_bounds(&self) -> Vec<Bounds> {
+        match &self.lens {
             None => Vec::new(),
-            Some(_) => (0..self.tiles()).map(|tile| self.tile_bounds(tile)).collect(),
-        };
-        let mut pairs: Vec<(u32, u32)> = Vec::with_capacity(faces.len() * 3 / 2);
-        for (index, face) in faces.iter().enumerate() {
-            self.tiles_of(face, &bounds, |tile| pairs.push((tile as u32, index as u32)));
+            Some(_) => (0..self.tiles()).map(|tile| self.bounds_of(tile)).collect(),
         }
-        let mut starts = vec![0; self.tiles() + 1];
-        pairs.iter().for_each(|&(tile, _)| starts[tile as usize + 1] += 1);
-        for tile in 0..self.tiles() {
-            starts[tile + 1] += starts[tile];
-        }
-        let (mut next, mut sorted) = (starts.clone(), vec![0; pairs.len()]);
-        for (tile, face) in pairs {
-            let slot = &mut next[tile as usize];
-            sorted[*slot] = face;
-            *slot += 1;
-        }
-        Bins { starts, faces: sorted }
     }
 
     fn tiles_of(&self, face: &EdgeFace, bounds: &[Bounds], mut add: impl FnMut(usize)) {
@@ -217,7 +234,7 @@ impl Samples {
         }
     }
 
-    fn tile_bounds(&self, tile: usize) -> Bounds {
+    fn bounds_of(&self, tile: usize) -> Bounds {
         let patch = self.tile_patch(tile);
         let mut bounds = Bounds::empty();
         for row in patch.rows {

@@ -2,7 +2,7 @@
 
 use super::Part;
 use super::samples::{Patch, Samples};
-use super::setup::{EdgeFace, Linear};
+use super::setup::{EdgeFace, Faces, Linear};
 use super::visibility::{NONE, Nearest};
 use crate::face::corners;
 use crate::filter::level_of_footprint;
@@ -38,7 +38,7 @@ pub(super) struct Seen {
 pub(super) struct Geometry<'a> {
     pub(super) samples: &'a Samples,
     pub(super) parts: &'a [Part<'a>],
-    pub(super) faces: &'a [EdgeFace],
+    pub(super) faces: &'a Faces,
 }
 
 /// Finding what a tile sees; `candidates` index the faces.
@@ -58,7 +58,7 @@ impl Work for Find<'_> {
         if self.candidates.is_empty() {
             return;
         }
-        let faces = self.candidates.iter().map(|&index| &self.geometry.faces[index as usize]);
+        let faces = self.candidates.iter().map(|&index| self.geometry.faces.at(index));
         self.nearest.fill::<E>(self.geometry.samples, self.tile, faces);
         self.seen.collect(self.geometry, self.tile, self.candidates, self.nearest);
     }
@@ -111,7 +111,7 @@ fn same(slots: &[u32], slot: u32) -> usize {
 impl Geometry<'_> {
     /// Also marks what a face needs of its part's texture.
     fn surface(&self, index: u32, patch: &Patch) -> Option<Surface> {
-        let face = &self.faces[index as usize];
+        let face = self.faces.at(index);
         let part = &self.parts[face.part as usize];
         let [width, height] = part.atlas_size.map(|size| size as f64);
         let texels = corners(part.mesh, face.face as usize)?.uvs.map(|uv| [uv.x * width, uv.y * height]);

@@ -6,6 +6,7 @@
 //! over, means a hit in front of the camera wherever the corners themselves may lie.
 
 use super::Part;
+use super::samples::{Bins, Samples};
 use crate::face::vertex;
 use capture::{Camera, Intrinsics};
 use nalgebra::{Matrix3, Point3, Vector3};
@@ -40,24 +41,64 @@ pub(super) struct EdgeFace {
     pub(super) high: [f64; 2],
 }
 
-/// Every face that may be seen, in the order of the parts and of their meshes.
-pub(super) fn faces(parts: &[Part<'_>], camera: &Camera) -> Vec<EdgeFace> {
-    let mut out = Vec::new();
-    for (index, part) in (0..).zip(parts) {
-        let to_camera = ToCamera::new(part, camera);
-        let mesh = &part.mesh.mesh;
-        // A vertex has six faces.
-        let place = |v: usize| vertex(part.mesh, v).map(|(position, _)| to_camera.apply(&position));
-        let vertices: Vec<Option<Vector3<f64>>> =
-            (0..mesh.positions.len()).into_par_iter().with_min_len(1024).map(place).collect();
-        let faces = mesh.faces.par_iter().with_min_len(512).enumerate().filter_map(|(face, corners)| {
-            let [a, b, c] = corners.map(|v| vertices.get(v as usize).copied().flatten());
-            let edges = edge_face(&[a?, b?, c?], &camera.intrinsics)?;
-            Some(EdgeFace { part: index, face: u32::try_from(face).ok()?, ..edges })
+/// Faces set up together: an index of a face is its batch's times this, and its own.
+const BATCH: usize = 1 << 11;
+
+/// All faces that may be seen, and the tiles they may be seen in; kept from frame to frame for their memory alone.
+#[derive(Debug, Default)]
+pub(super) struct Faces {
+    batches: Vec<Batch>,
+    /// Of each part, in the camera's coordinates.
+    vertices: Vec<Vec<Option<Vector3<f64>>>>,
+}
+
+#[derive(Debug, Default)]
+struct Batch {
+    faces: Vec<EdgeFace>,
+    bins: Bins,
+}
+
+impl Faces {
+    /// Sets up the faces of `parts`.
+    pub(super) fn set_up(&mut self, parts: &[Part<'_>], camera: &Camera, samples: &Samples) {
+        self.vertices.resize_with(parts.len(), Vec::new);
+        for (part, vertices) in parts.iter().zip(&mut self.vertices) {
+            let to_camera = ToCamera::new(part, camera);
+            // A vertex has six faces.
+            let place = |v: usize| vertex(part.mesh, v).map(|(position, _)| to_camera.apply(&position));
+            let count = part.mesh.mesh.positions.len();
+            (0..count).into_par_iter().with_min_len(1024).map(place).collect_into_vec(vertices);
+        }
+        let firsts = |part: &Part<'_>| (0..part.mesh.mesh.faces.len()).step_by(BATCH);
+        let places: Vec<(usize, usize)> =
+            parts.iter().enumerate().flat_map(|(k, part)| firsts(part).map(move |first| (k, first))).collect();
+        self.batches.resize_with(places.len(), Batch::default);
+        let (bounds, vertices) = (samples.tile_bounds(), &self.vertices);
+        self.batches.par_iter_mut().zip(&places).for_each(|(batch, &(part, first))| {
+            batch.faces.clear();
+            let faces = parts[part].mesh.mesh.faces[first..].iter().take(BATCH).zip(first..);
+            batch.faces.extend(faces.filter_map(|(corners, face)| {
+                let [a, b, c] = corners.map(|v| vertices[part].get(v as usize).copied().flatten());
+                let edges = edge_face(&[a?, b?, c?], &camera.intrinsics)?;
+                Some(EdgeFace { part: part as u32, face: u32::try_from(face).ok()?, ..edges })
+            }));
+            samples.bin(&batch.faces, &bounds, &mut batch.bins);
         });
-        out.par_extend(faces);
     }
-    out
+
+    /// A face by its index.
+    #[inline]
+    pub(super) fn at(&self, index: u32) -> &EdgeFace {
+        &self.batches[index as usize / BATCH].faces[index as usize % BATCH]
+    }
+
+    /// Indices of the faces that a tile may see, in the order of the parts and of their meshes.
+    pub(super) fn gather(&self, tile: usize, candidates: &mut Vec<u32>) {
+        candidates.clear();
+        for (batch, first) in self.batches.iter().zip((0..).step_by(BATCH)) {
+            candidates.extend(batch.bins.of(tile).iter().map(|&face| first + face));
+        }
+    }
 }
 
 /// From a part's coordinates to the camera's.
