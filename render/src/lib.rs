@@ -20,6 +20,7 @@
 
 pub mod backdrop;
 pub mod blend;
+pub mod blender;
 pub mod cpu;
 mod error;
 mod face;

@@ -40,7 +40,7 @@ use weights::Weights;
 
 /// The texture of one model, blended as eyes ask for it.
 #[derive(Debug)]
-pub struct Blender<'a> {
+pub struct Atlas<'a> {
     source: Source<'a>,
     /// Level 0, in 1/32 of a level of 0..=255.
     base: Image<[i16; 3]>,
@@ -97,7 +97,7 @@ struct Rows<'a> {
     texels: &'a mut [[i16; 3]],
 }
 
-impl<'a> Blender<'a> {
+impl<'a> Atlas<'a> {
     /// Lays out what `model` holds; nothing is blended yet.
     pub fn new(model: &'a Model) -> Self {
         Self::with_level(model, Level::widest())
@@ -131,7 +131,7 @@ impl<'a> Blender<'a> {
         [self.base.width(), self.base.height()]
     }
 
-    /// What to write down for [`Blender::blend`].
+    /// What to write down for [`Atlas::blend`].
     pub fn wanted(&self) -> Wanted {
         match self.source {
             Source::Layers(_) => Wanted::up_to(BLOCK_LEVEL - 1, self.size()),
@@ -139,7 +139,7 @@ impl<'a> Blender<'a> {
         }
     }
 
-    /// Makes what is `wanted` what `eye`, in the model's coordinates, sees. `wanted` must be this blender's.
+    /// Makes what is `wanted` what `eye`, in the model's coordinates, sees. `wanted` must be this atlas's.
     pub fn blend(&mut self, eye: &Point3<f64>, wanted: &Wanted) {
         self.frame += 1;
         let top = wanted.top().min(self.reduced.len());

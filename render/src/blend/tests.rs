@@ -3,7 +3,7 @@
 use super::kernel::blend;
 use super::pack::{Line, VALUES};
 use super::weights::Weights;
-use super::{Blender, Wanted};
+use super::{Atlas, Wanted};
 use crate::filter::{FIXED_ONE, FIXED_PLACES};
 use crate::simd::Level;
 use capture::Image;
@@ -91,11 +91,11 @@ fn a_blend_is_the_atlas_to_a_fraction_of_a_level() {
     {
         let model = model(size, ranks, scale);
         for level in Level::available() {
-            let mut blender = Blender::with_level(&model, level);
+            let mut atlas = Atlas::with_level(&model, level);
             for eye in [Point3::new(1.0, 2.0, 3.0), Point3::new(9.0, 0.1, -2.0), Point3::new(9.0, 0.1, -2.0)] {
-                blender.blend(&eye, &Wanted::all(size, 3));
-                let atlas = model.atlas(&eye);
-                for (fixed, exact) in blender.texels().pixels().iter().zip(atlas.pixels()) {
+                atlas.blend(&eye, &Wanted::all(size, 3));
+                let exact = model.atlas(&eye);
+                for (fixed, exact) in atlas.texels().pixels().iter().zip(exact.pixels()) {
                     for c in 0..3 {
                         let clamped = exact[c].clamp(-1024.0, 1023.97);
                         let apart = (f32::from(fixed[c]) / FIXED_ONE - clamped).abs();
@@ -112,12 +112,12 @@ fn a_blend_is_the_atlas_to_a_fraction_of_a_level() {
 fn mip_levels_are_those_of_the_texture() {
     for size in [[70, 45], [64, 128], [17, 3], [1, 40]] {
         let model = model(size, [4; 4], 0.3);
-        let mut blender = Blender::new(&model);
+        let mut atlas = Atlas::new(&model);
         let wanted = Wanted::all(size, 20);
         for eye in [Point3::new(1.0, 2.0, 3.0), Point3::new(-3.0, 2.0, 3.0)] {
-            blender.blend(&eye, &wanted);
-            let expected = crate::filter::MipChain::build(blender.texels(), 20);
-            let chain = blender.chain(&wanted);
+            atlas.blend(&eye, &wanted);
+            let expected = crate::filter::MipChain::build(atlas.texels(), 20);
+            let chain = atlas.chain(&wanted);
             for level in 0..=7 {
                 let pairs = chain.level(level).pixels().iter().zip(expected.level(level).pixels());
                 let apart = pairs.flat_map(|(a, b)| (0..3).map(|c| a[c].abs_diff(b[c]))).max().unwrap();
@@ -132,13 +132,13 @@ fn mip_levels_are_those_of_the_texture() {
 #[test]
 fn what_is_fresh_is_not_blended_again() {
     let model = model([70, 45], [1; 4], 0.3);
-    let mut blender = Blender::new(&model);
+    let mut atlas = Atlas::new(&model);
     let (near, far) = (Wanted::all([70, 45], 0), Wanted::all([70, 45], 6));
-    blender.blend(&Point3::new(1.0, 2.0, 3.0), &near);
-    assert!(blender.bytes() > 0);
-    blender.blend(&Point3::new(4.0, 2.0, -3.0), &far);
-    assert_eq!(blender.bytes(), 0);
-    assert!(blender.chain(&far).level(3) == crate::filter::MipChain::build(blender.texels(), 3).level(3));
+    atlas.blend(&Point3::new(1.0, 2.0, 3.0), &near);
+    assert!(atlas.bytes() > 0);
+    atlas.blend(&Point3::new(4.0, 2.0, -3.0), &far);
+    assert_eq!(atlas.bytes(), 0);
+    assert!(atlas.chain(&far).level(3) == crate::filter::MipChain::build(atlas.texels(), 3).level(3));
 }
 
 #[test]

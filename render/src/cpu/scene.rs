@@ -2,7 +2,7 @@
 
 use super::shade::Look;
 use super::{Canvas, Part, StageTimes};
-use crate::blend::{Blender, Wanted};
+use crate::blend::{Atlas, Wanted};
 use crate::material::{Coats, Lighting, Lit};
 use crate::{Pose, RenderOptions};
 use capture::{Camera, Image};
@@ -35,7 +35,7 @@ struct Actor<'a> {
     mesh: &'a TexturedMesh,
     pose: Pose,
     coats: Option<&'a Coats<'a>>,
-    blender: Blender<'a>,
+    atlas: Atlas<'a>,
     wanted: Wanted,
     lighting: Lighting,
 }
@@ -51,10 +51,10 @@ impl<'a> ScenePlayer<'a> {
     /// A player of `objects`.
     pub fn new(objects: &[Object<'a>], options: RenderOptions) -> Self {
         let actor = |object: &Object<'a>| {
-            let blender = Blender::new(object.model);
-            let wanted = blender.wanted();
+            let atlas = Atlas::new(object.model);
+            let wanted = atlas.wanted();
             let Object { model, pose, coats } = *object;
-            Actor { mesh: &model.mesh, pose, coats, blender, wanted, lighting: Lighting::default() }
+            Actor { mesh: &model.mesh, pose, coats, atlas, wanted, lighting: Lighting::default() }
         };
         Self { actors: objects.par_iter().map(actor).collect(), canvas: Canvas::new(options) }
     }
@@ -66,7 +66,7 @@ impl<'a> ScenePlayer<'a> {
 
     /// Bytes of layers and rays that the last frame read.
     pub fn bytes(&self) -> u64 {
-        self.actors.iter().map(|actor| actor.blender.bytes()).sum()
+        self.actors.iter().map(|actor| actor.atlas.bytes()).sum()
     }
 
     /// Draws one frame, materials under `lighting`; the same contract as [`crate::reference::render_lit`] of each model.
@@ -83,17 +83,17 @@ impl<'a> ScenePlayer<'a> {
             actor.lighting = actor.pose.lighting(lighting);
         }
         let eye = camera.center();
-        // The blenders change while the rest is lent to the canvas.
-        let (mut blenders, actors): (Vec<_>, Vec<_>) = self.actors.iter_mut().map(Actor::parted).unzip();
+        // The atlases change while the rest is lent to the canvas.
+        let (mut atlases, actors): (Vec<_>, Vec<_>) = self.actors.iter_mut().map(Actor::parted).unzip();
         let parts: Vec<Part<'_>> = actors.iter().map(Standing::part).collect();
         self.canvas.draw(&parts, camera, frame, || {
-            let looks = blenders.par_iter_mut().zip(&actors);
-            looks.map(|(blender, actor)| actor.look(blender, &actor.pose.to_object(&eye))).collect()
+            let looks = atlases.par_iter_mut().zip(&actors);
+            looks.map(|(atlas, actor)| actor.look(atlas, &actor.pose.to_object(&eye))).collect()
         });
     }
 }
 
-/// An actor but for its blender.
+/// An actor but for its atlas.
 struct Standing<'s> {
     mesh: &'s TexturedMesh,
     pose: Pose,
@@ -104,10 +104,10 @@ struct Standing<'s> {
 }
 
 impl<'a> Actor<'a> {
-    fn parted<'s>(&'s mut self) -> (&'s mut Blender<'a>, Standing<'s>) {
-        let atlas_size = self.blender.size();
-        let Self { mesh, pose, coats, blender, wanted, lighting } = self;
-        (blender, Standing { mesh, pose: *pose, coats: *coats, wanted, lighting, atlas_size })
+    fn parted<'s>(&'s mut self) -> (&'s mut Atlas<'a>, Standing<'s>) {
+        let atlas_size = self.atlas.size();
+        let Self { mesh, pose, coats, atlas, wanted, lighting } = self;
+        (atlas, Standing { mesh, pose: *pose, coats: *coats, wanted, lighting, atlas_size })
     }
 }
 
@@ -117,12 +117,12 @@ impl<'s> Standing<'s> {
         Part { mesh, pose, atlas_size, coats, wanted }
     }
 
-    fn look<'b>(&self, blender: &'b mut Blender<'_>, eye: &nalgebra::Point3<f64>) -> Look<'b, i16>
+    fn look<'b>(&self, atlas: &'b mut Atlas<'_>, eye: &nalgebra::Point3<f64>) -> Look<'b, i16>
     where
         's: 'b,
     {
-        blender.blend(eye, self.wanted);
+        atlas.blend(eye, self.wanted);
         let lit = self.coats.map(|coats| Lit { coats, lighting: self.lighting });
-        Look { chain: blender.chain(self.wanted), lit, eye: *eye }
+        Look { chain: atlas.chain(self.wanted), lit, eye: *eye }
     }
 }
