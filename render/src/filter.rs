@@ -106,7 +106,7 @@ pub const FIXED_PLACES: u32 = 5;
 pub const FIXED_ONE: f32 = (1 << FIXED_PLACES) as f32;
 
 impl Channel for f32 {
-    const LEVELS: f32 = 1.0;
+    const LEVELS: Self = 1.0;
 
     #[inline(always)]
     fn widened(self) -> f32 {
@@ -185,7 +185,7 @@ impl Channel for i16 {
 }
 
 /// `log2(1 + m) = m (1 + (1 − m) P(m))`: coefficients of P.
-const LOG2: [f32; 4] = [0.441_917_04, -0.267_179_4, 0.148_426_61, -0.045_149_03];
+const LOG2: [f32; 4] = [0.441_917_04, -0.267_179_4, 0.148_426_6, -0.045_149_03];
 
 /// An atlas and as many reductions of it as were asked for.
 #[derive(Clone, Debug)]
@@ -252,6 +252,31 @@ impl<'a, T: Channel> MipChain<'a, T> {
     }
 }
 
+impl<T: Channel> MipChain<'_, T> {
+    /// [`MipChain::look_up`] of up to N places side by side, as many as `out` holds.
+    #[inline(always)]
+    pub(crate) fn look_up_all<E: Eight, const N: usize>(&self, [xs, ys, levels]: [&[f32; N]; 3], out: &mut [[T; 4]]) {
+        let count = out.len().min(N);
+        if levels[..count].iter().any(|&level| level >= MIN_LEVEL) {
+            for (k, out) in out.iter_mut().enumerate().take(count) {
+                *out = self.look_up::<E>(xs[k], ys[k], levels[k]);
+            }
+            return;
+        }
+        // On the one level that nearby objects show, places are found in vectors.
+        let columns: Axis<N> = Axis::new(&xs[..count], self.base.width());
+        let rows: Axis<N> = Axis::new(&ys[..count], self.base.height());
+        for (k, out) in out.iter_mut().enumerate().take(count) {
+            let (column, row) = (columns.firsts[k] as usize, rows.firsts[k] as usize);
+            let place = Place { column, row, across: columns.shares[k], down: rows.shares[k] };
+            *out = match place.taps(self.base) {
+                Some(taps) => T::mix::<E>(&taps, None),
+                None => mix_bordering::<T, E>([self.base; 2], [place; 2], 0.0),
+            };
+        }
+    }
+}
+
 /// The level of one single texel.
 pub fn top_level(width: usize, height: usize) -> usize {
     let longest = width.max(height).max(1);
@@ -302,6 +327,23 @@ pub(crate) fn halve_row<T: Channel>(above: &[[T; 3]], below: &[[T; 3]], out: &mu
     }
 }
 
+/// Places on one axis of a level, side by side.
+struct Axis<const N: usize> {
+    firsts: [i32; N],
+    shares: [f32; N],
+}
+
+impl<const N: usize> Axis<N> {
+    #[inline(always)]
+    fn new(at: &[f32], size: usize) -> Self {
+        let mut axis = Self { firsts: [0; N], shares: [0.0; N] };
+        for ((&at, first), share) in at.iter().zip(&mut axis.firsts).zip(&mut axis.shares) {
+            (*first, *share) = before(at, size);
+        }
+        axis
+    }
+}
+
 /// A place on one level: the texel whose centre lies before it, and how far it is on the way to the next.
 #[derive(Clone, Copy, Debug)]
 struct Place {
@@ -320,7 +362,7 @@ impl Place {
     {
         let (column, across) = before(x, image.width());
         let (row, down) = before(y, image.height());
-        Self { column, row, across, down }
+        Self { column: column as usize, row: row as usize, across, down }
     }
 
     /// `None` where there are no two texels and two numbers more in both rows: at the end of an image, in one that is one
@@ -365,12 +407,12 @@ fn mix_bordering<T: Channel, E: Eight>(images: [&Image<[T; 3]>; 2], places: [Pla
 /// The texel whose centre lies before `x` and how far `x` is on the way to the next. The last texel is
 /// reached as the next of the one before it.
 #[inline]
-fn before(x: f32, size: usize) -> (usize, f32) {
+fn before(x: f32, size: usize) -> (i32, f32) {
     // In 32 bits, which no image's side leaves: conversions from and to 64 are slow.
     let last = size as i32 - 1;
     let x = (x - 0.5).max(0.0).min(last.max(0) as f32);
     let first = (x as i32).min((last - 1).max(0));
-    (first as usize, x - first as f32)
+    (first, x - first as f32)
 }
 
 #[cfg(test)]

@@ -1,7 +1,5 @@
 //! Models played from their 8-bit layers look as the reference draws their textures in `f32`.
 
-#![allow(clippy::unwrap_used, reason = "a helper that fails fails its test")]
-
 #[path = "support/closed_forms.rs"]
 mod closed_forms;
 mod support;

@@ -107,9 +107,7 @@ impl<T: Channel> Shading<'_, T> {
             *level = quick_level_of_footprint(footprint);
         }
         let chain = &self.looks[surface.part as usize].chain;
-        for k in 0..length {
-            colours[k] = chain.look_up::<E>(span.x[k], span.y[k], levels[k]);
-        }
+        chain.look_up_all::<E, SPAN>([&span.x, &span.y, &levels], &mut colours[..length]);
         &colours[..length]
     }
 

@@ -1,5 +1,8 @@
 //! Models in closed form: no fit, no noise.
 
+#![allow(dead_code, reason = "every test binary uses some of it")]
+#![allow(clippy::unwrap_used, reason = "a helper that fails fails its test")]
+
 use capture::Image;
 use geometry::{Mesh, TexturedMesh};
 use nalgebra::{Point2, Point3, Vector3};
@@ -123,7 +126,7 @@ pub(crate) fn lumigraph(mesh: TexturedMesh, rays: usize) -> Model {
 fn pattern([width, height]: [usize; 2], k: f64) -> Image<[u8; 3]> {
     let value = |i: usize, c: f64| {
         let (x, y) = ((i % width) as f64, (i / width) as f64);
-        let check = if ((i % width) / 8 + (i / width) / 8) % 2 == 0 { 20.0 } else { -20.0 };
+        let check = if ((i % width) / 8 + (i / width) / 8).is_multiple_of(2) { 20.0 } else { -20.0 };
         128.0 + 70.0 * (x * 0.05 * (1.0 + 0.1 * k) + c).sin() * (y * 0.04 + k).cos() + check
     };
     let pixels = (0..width * height).map(|i| [0.0, 1.0, 2.0].map(|c| value(i, c) as u8)).collect();

@@ -97,7 +97,7 @@ fn pattern(k: f64) -> Image<[u8; 3]> {
     let mut image = Image::filled(ATLAS, ATLAS, [0; 3]);
     for (i, texel) in image.pixels_mut().iter_mut().enumerate() {
         let (x, y) = (i % ATLAS, i / ATLAS);
-        let check = if (x / 8 + y / 8) % 2 == 0 { 20.0 } else { -20.0 };
+        let check = if (x / 8 + y / 8).is_multiple_of(2) { 20.0 } else { -20.0 };
         let wave = |c: f64| (x as f64 * 0.05 * (1.0 + 0.1 * k) + c).sin() * (y as f64 * 0.04 + k).cos();
         *texel = [0.0, 1.0, 2.0].map(|c| (128.0 + 70.0 * wave(c) + check) as u8);
     }

@@ -4,7 +4,7 @@ use super::{check_extension, read_file};
 use crate::Answer;
 use crate::arguments::{BenchCommand, BenchPlaybackArgs};
 use serde_json::json;
-use std::path::PathBuf;
+use std::path::Path;
 use turnlight::Error;
 use turnlight::bench::object::bumpy_ball;
 use turnlight::bench::playback::{PlaybackOptions, playback};
@@ -28,7 +28,7 @@ fn time_playback(args: &BenchPlaybackArgs, observer: &dyn Observer) -> Result<An
     let mut stages = Stages::new(observer);
     let models = stages.run("read", |_| match args.models.as_slice() {
         [] => Ok(vec![bumpy_ball(args.seed)]),
-        paths => paths.iter().map(read_model).collect::<Result<Vec<_>, _>>(),
+        paths => paths.iter().map(|path| read_model(path)).collect::<Result<Vec<_>, _>>(),
     })?;
     let objects = args.objects.map_or(OBJECTS.to_vec(), |count| vec![count]);
     let options = PlaybackOptions { objects, size: args.size, frames: args.frames };
@@ -40,6 +40,6 @@ fn time_playback(args: &BenchPlaybackArgs, observer: &dyn Observer) -> Result<An
     Ok(Answer { text, json })
 }
 
-fn read_model(path: &PathBuf) -> Result<Model, Error> {
+fn read_model(path: &Path) -> Result<Model, Error> {
     Ok(Model::from_glb(&read_file(path)?, path)?)
 }
