@@ -143,8 +143,8 @@ fn pose(keys: &ObjectKeys) -> Result<Pose, String> {
         return Err(format!("its scale is {}; give a positive number", keys.scale));
     }
     let [x, y, z, w] = keys.rotation;
-    let rotation =
-        UnitQuaternion::try_new(Quaternion::new(w, x, y, z), 1e-6).filter(|q| q.coords.iter().all(|c| c.is_finite()));
+    let quaternion = keys.rotation.iter().all(is_number).then_some(Quaternion::new(w, x, y, z));
+    let rotation = quaternion.and_then(|q| UnitQuaternion::try_new(q, 1e-6));
     let rotation =
         rotation.ok_or_else(|| format!("its rotation is {:?}; give a unit quaternion [x, y, z, w]", keys.rotation))?;
     let rotation = rotation.to_rotation_matrix().into_inner();
