@@ -4,7 +4,8 @@
 //! to draw a mesh with one texture. Two renderers do that by one definition:
 //!
 //! - [`reference`](mod@reference) casts a ray per sub-sample and is the arbiter;
-//! - [`cpu`] rasterises the same sub-samples in tiles and is what one plays with.
+//! - [`cpu`] rasterises the same sub-samples in tiles and is what one plays with, models straight from
+//!   their 8-bit layers ([`blend`]).
 //!
 //! The definition. A pixel has `n × n` sub-samples at the centres of a regular grid. Each sees the
 //! nearest surface (either side of a face, any depth above zero), looks up the texture with
@@ -17,6 +18,8 @@
 //! mip level; filtering is isotropic, so surfaces at grazing angles blur along the far direction;
 //! frames beyond [`MAX_PIXELS`] come back empty; of two faces at the very same depth either may show.
 
+pub mod backdrop;
+pub mod blend;
 pub mod blender;
 pub mod cpu;
 mod error;
@@ -25,11 +28,14 @@ pub mod film;
 pub mod filter;
 pub mod material;
 pub mod path;
+mod pose;
 pub mod reference;
 mod resolve;
+mod simd;
 pub mod web;
 
 pub use error::RenderError;
+pub use pose::Pose;
 
 use capture::Camera;
 
