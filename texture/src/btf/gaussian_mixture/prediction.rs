@@ -96,34 +96,36 @@ pub(super) fn few_with<V: Vector>(mixture: &Packed, angles: [f32; 4], places: &[
 /// `ln w − Σ ln σ − ½ Σ z²` over the angles, of the vectors of components from `first` on.
 #[inline(always)]
 fn angular<V: Vector>(mixture: &Packed, angles: [f32; 4], first: usize, out: &mut [Row]) {
-    for (g, out) in out.iter_mut().enumerate() {
-        let mut log = V::load(&mixture.input.as_chunks::<LANES>().0[first + g]);
-        for (v, &angle) in angles.iter().enumerate() {
-            log = log.less_square(scaled(mixture, 2 + v, first + g, angle));
+    let count = out.len();
+    out.copy_from_slice(&mixture.input.as_chunks::<LANES>().0[first..][..count]);
+    for (v, angle) in angles.into_iter().enumerate() {
+        let (means, scales) = of_block(mixture, 2 + v, first, count);
+        for ((out, mean), scale) in out.iter_mut().zip(means).zip(scales) {
+            V::load(out).less_square(V::splat(angle).minus(V::load(mean)).times(V::load(scale))).store(out);
         }
-        log.store(out);
     }
 }
 
 /// Log densities of all inputs where `energies` has what the angles say; the largest.
 #[inline(always)]
 fn at_place<V: Vector>(mixture: &Packed, energies: &[Row], place: [f32; 2], first: usize, out: &mut [Row]) -> f32 {
+    let [x, y] = place.map(V::splat);
+    let [(mean_x, scale_x), (mean_y, scale_y)] = [0, 1].map(|v| of_block(mixture, v, first, energies.len()));
     let mut top = V::splat(f32::NEG_INFINITY);
     for (g, (out, energy)) in out.iter_mut().zip(energies).enumerate() {
-        let across = scaled(mixture, 0, first + g, place[0]);
-        let log = V::load(energy).less_square(across).less_square(scaled(mixture, 1, first + g, place[1]));
+        let across = x.minus(V::load(&mean_x[g])).times(V::load(&scale_x[g]));
+        let down = y.minus(V::load(&mean_y[g])).times(V::load(&scale_y[g]));
+        let log = V::load(energy).less_square(across).less_square(down);
         log.store(out);
         top = top.larger(log);
     }
     top.largest()
 }
 
-/// Differences of a variable from the means of a vector of components, over σ √2.
-#[inline(always)]
-fn scaled<V: Vector>(mixture: &Packed, variable: usize, vector: usize, at: f32) -> V {
-    let mean = V::load(&mixture.mean[variable].as_chunks::<LANES>().0[vector]);
-    let scale = V::load(&mixture.scale[variable].as_chunks::<LANES>().0[vector]);
-    V::splat(at).minus(mean).times(scale)
+/// Means and scales of a variable, of `count` vectors of components from `first` on.
+fn of_block(mixture: &Packed, variable: usize, first: usize, count: usize) -> (&[Row], &[Row]) {
+    let [means, scales] = [&mixture.mean, &mixture.scale].map(|all| all[variable].as_chunks::<LANES>().0);
+    (&means[first..][..count], &scales[first..][..count])
 }
 
 /// Sums over components as far as they were looked at.
@@ -145,18 +147,21 @@ impl<V: Vector> Answer<V> {
     #[inline(always)]
     fn take(&mut self, mixture: &Packed, logs: &[Row], top: f32, first: usize) {
         self.raise(top);
+        let colours = [0, 1, 2].map(|c| &mixture.mean[INPUTS + c].as_chunks::<LANES>().0[first..][..logs.len()]);
+        // In registers, not behind a reference.
+        let mut sums = self.sums;
         for (g, log) in logs.iter().enumerate() {
             let log = V::load(log).minus(V::splat(self.best));
             if log.at_least(V::splat(-REACH)) == 0 {
                 continue;
             }
             let share = log.exp();
-            self.sums[3] = self.sums[3].plus(share);
+            sums[3] = sums[3].plus(share);
             for c in 0..3 {
-                let means = mixture.mean[INPUTS + c].as_chunks::<LANES>().0;
-                self.sums[c] = share.times_plus(V::load(&means[first + g]), self.sums[c]);
+                sums[c] = share.times_plus(V::load(&colours[c][g]), sums[c]);
             }
         }
+        self.sums = sums;
     }
 
     /// Sums over the exponential of a larger logarithm.
