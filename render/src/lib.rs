@@ -1,10 +1,11 @@
 //! Playback: a textured mesh and a camera in, an RGBA picture out.
 //!
 //! An appearance depends on the eye alone once per frame (`texture::Model::atlas`); what is left is
-//! to draw a mesh with one texture. Two renderers do that by one definition:
+//! to draw a mesh with one texture. Three renderers do that by one definition:
 //!
 //! - [`reference`](mod@reference) casts a ray per sub-sample and is the arbiter;
-//! - [`cpu`] rasterises the same sub-samples in tiles and is what one plays with.
+//! - [`cpu`] rasterises the same sub-samples in tiles and is what one plays with;
+//! - `gpu` has graphics hardware do it (feature `gpu`).
 //!
 //! The definition. A pixel has `n × n` sub-samples at the centres of a regular grid. Each sees the
 //! nearest surface (either side of a face, any depth above zero), looks up the texture with
@@ -22,6 +23,8 @@ mod error;
 mod face;
 pub mod film;
 pub mod filter;
+#[cfg(feature = "gpu")]
+pub mod gpu;
 pub mod material;
 pub mod path;
 pub mod reference;
