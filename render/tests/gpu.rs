@@ -4,22 +4,23 @@
 
 #[path = "support/difference.rs"]
 mod difference;
+#[path = "support/models.rs"]
+mod models;
 mod support;
 
 use capture::btf::{Btf, Encoding, bonn_directions};
 use capture::{Camera, Distortion, Image};
 use difference::{Difference, difference};
 use geometry::TexturedMesh;
+use models::{layered, lumigraph};
 use nalgebra::{Matrix3, Point3, Vector3};
 use render::gpu::{Blend, Device, GpuError, Renderer, Shot, Target, wgpu};
 use render::material::{Coat, Coats, Light, Lighting, Lit};
 use render::{RenderOptions, cpu, reference};
 use std::sync::OnceLock;
 use support::{atlas, knot, look_at, sphere, surface, torus};
-use texture::appearance::Lumigraph;
+use texture::Method;
 use texture::btf::{Budget, Precision, Sampler, gaussian_mixture, multilevel_vq};
-use texture::directions::{DirectionComplex, Layout};
-use texture::{Appearance, FacetWeights, Layer, Layers, Method, Model, SurfaceTexels};
 
 /// The one device of these tests.
 fn device() -> Option<&'static Device> {
@@ -200,7 +201,7 @@ fn what_does_not_fit_is_refused() {
     assert!(matches!(fault, GpuError::TooLarge { .. }) && fault.to_string().contains("let the CPU play"), "{fault}");
     mesh.atlas_size = [1 << 14, 1 << 14];
     assert!(matches!(Renderer::of_mesh(device, &mesh).unwrap_err(), GpuError::TooLarge { .. }));
-    let model = layered(Method::Vdtm, &torus(12, 8), 5000);
+    let model = layered(Method::Vdtm, &torus(12, 8), 5000, [24, 20]);
     let fault = Renderer::with_blend(device, &model, Blend::Adapter).unwrap_err();
     assert!(fault.to_string().contains("5000 layers"), "{fault}");
     assert!(Renderer::with_blend(device, &model, Blend::Cpu).is_ok());
@@ -259,73 +260,15 @@ fn contents(device: &Device, texture: &wgpu::Texture) -> Image<[u8; 4]> {
     Image::from_pixels(width as usize, height as usize, rows.collect()).unwrap()
 }
 
-/// Bands of facets with some directions each, and layers of both signs: what VDTM and DynTex are made of.
-fn layered(method: Method, mesh: &TexturedMesh, count: usize) -> Model {
-    let [width, height] = [96, 80];
-    let mut mesh = mesh.clone();
-    mesh.atlas_size = [width, height];
-    let layer = |k: usize| {
-        let value = |x: usize, y: usize, c: usize| {
-            let (x, y, k) = (x as f32, y as f32, k as f32);
-            (128.0 + 120.0 * ((0.1 + 0.04 * k) * x + c as f32).sin() * ((0.13 + 0.03 * k) * y).cos()) as u8
-        };
-        let pixels = (0..width * height).map(|i| [0, 1, 2].map(|c| value(i % width, i / width, c))).collect();
-        let texels = Image::from_pixels(width, height, pixels).unwrap();
-        let (scale, offset) = if k == 0 { (1.0, 0.0) } else { (0.6, -76.8) };
-        Layer { texels, scale, offset, coded: Vec::new() }
-    };
-    let bands = 12;
-    let band = |i: usize| ((i / width) * bands / height) as u16;
-    let facet_of_texel = Image::from_pixels(width, height, (0..width * height).map(band).collect()).unwrap();
-    let sites: Vec<Vector3<f64>> = (0..14)
-        .map(|k| f64::from(k) * 2.4)
-        .map(|a| Vector3::new(a.cos(), a.sin(), 1.4 * (0.37 * a).sin()).normalize())
-        .collect();
-    let facet = |f: usize| {
-        let sites = if method == Method::Static { &[] } else { &sites[..] };
-        let rank = (1 + f % count).max(if method == Method::Vdtm { count } else { 1 });
-        let weight = |s: usize, k: usize| if k == 0 { 1.0 } else { ((s * 5 + k * 3 + f) as f32).sin() };
-        let table = (0..sites.len()).flat_map(|s| (0..rank).map(move |k| weight(s, k))).collect();
-        let center = Point3::new(0.1 * (f as f64).cos(), 0.1 * (f as f64).sin(), 0.02 * f as f64);
-        FacetWeights { center, complex: DirectionComplex::build(sites, Layout::General), rank, table }
-    };
-    let layers =
-        Layers { layers: (0..count).map(layer).collect(), facet_of_texel, facets: (0..bands).map(facet).collect() };
-    Model { mesh, method, appearance: Appearance::Layers(layers), materials: Vec::new() }
-}
-
-/// Rays of three to seven of nine views, other ones for each texel; some texels have none.
-fn lumigraph(mesh: &TexturedMesh) -> Model {
-    let mut mesh = mesh.clone();
-    mesh.atlas_size = [70, 61];
-    let surface = SurfaceTexels::bake(&mesh);
-    let rays = 7;
-    let (mut colors, mut views) = (vec![[0u8; 3]; rays * surface.len()], vec![u16::MAX; rays * surface.len()]);
-    for t in 0..surface.len() {
-        let used = if t % 97 == 0 { 0 } else { 3 + t % 5 };
-        for k in 0..used {
-            let view = (t / 7 + k * 4) % 9;
-            views[t * rays + k] = view as u16;
-            let wave = |c: usize| 127.0 + 100.0 * (0.01 * t as f64 + view as f64 + c as f64).sin();
-            colors[t * rays + k] = [0, 1, 2].map(|c| wave(c) as u8);
-        }
-    }
-    let center = |v: u32| Point3::new(3.0 * f64::from(v).cos(), 3.0 * f64::from(v).sin(), f64::from(v % 3));
-    let centers = (0..9).map(center).collect();
-    let lumigraph = Lumigraph { centers, rays, colors, views, coded: Vec::new() };
-    let appearance = Appearance::Lumigraph(lumigraph, surface);
-    Model { mesh, method: Method::Lumigraph, appearance, materials: Vec::new() }
-}
-
 #[test]
 fn every_method_is_drawn_alike_whoever_blends() {
     let Some(device) = device() else { return };
     let mesh = torus(60, 24);
     let models = [
-        layered(Method::Static, &mesh, 1),
-        layered(Method::Vdtm, &mesh, 9),
-        layered(Method::DynTex, &mesh, 20),
-        lumigraph(&mesh),
+        layered(Method::Static, &mesh, 1, [96, 80]),
+        layered(Method::Vdtm, &mesh, 9, [96, 80]),
+        layered(Method::DynTex, &mesh, 20, [96, 80]),
+        lumigraph(&mesh, [70, 61]),
     ];
     let eyes = [[3.0, 0.4, 1.0], [0.3, -2.0, 2.0], [-1.6, 1.1, -0.6]];
     for (model, blend) in models.iter().flat_map(|m| [Blend::Adapter, Blend::Cpu].map(|blend| (m, blend))) {
@@ -346,7 +289,11 @@ fn every_method_is_drawn_alike_whoever_blends() {
 fn the_methods_of_these_tests_depend_on_the_eye() {
     let mesh = torus(60, 24);
     let camera = look_at(Point3::new(3.0, 0.4, 1.0), Point3::origin(), 180.0, 201, 151);
-    for model in [layered(Method::Vdtm, &mesh, 9), layered(Method::DynTex, &mesh, 20), lumigraph(&mesh)] {
+    for model in [
+        layered(Method::Vdtm, &mesh, 9, [96, 80]),
+        layered(Method::DynTex, &mesh, 20, [96, 80]),
+        lumigraph(&mesh, [70, 61]),
+    ] {
         let seen = |eye: &Point3<f64>| cpu::render(&model.mesh, &model.atlas(eye), &camera, &at(2));
         let d = difference(&seen(&camera.center()), &seen(&Point3::new(0.3, -2.0, 2.0)));
         assert!(d.inner_off * 4 > d.inner, "{d:?}");

@@ -110,7 +110,7 @@ impl Device {
     pub(super) fn buffer(&self, bytes: &[u8], usage: wgpu::BufferUsages) -> Result<wgpu::Buffer, GpuError> {
         let limits = self.limits();
         let limit = if usage.contains(wgpu::BufferUsages::STORAGE) {
-            limits.max_buffer_size.min(u64::from(limits.max_storage_buffer_binding_size))
+            limits.max_buffer_size.min(limits.max_storage_buffer_binding_size)
         } else {
             limits.max_buffer_size
         };

@@ -166,7 +166,7 @@ fn radiance_of(columns: Span, rows: Span, place: Place) -> vec3<f32> {
     return sum * coat.inverse_exposure;
 }
 
-fn radiance(face: Face, laid: CoatedFace, hit: Hit) -> vec3<f32> {
+fn radiance(laid: CoatedFace, hit: Hit, is_back: bool) -> vec3<f32> {
     let w = hit.weights;
     let along = laid.tangents[0] * w.x + laid.tangents[1] * w.y + laid.tangents[2] * w.z;
     let upward = laid.normals[0] * w.x + laid.normals[1] * w.y + laid.normals[2] * w.z;
@@ -177,7 +177,6 @@ fn radiance(face: Face, laid: CoatedFace, hit: Hit) -> vec3<f32> {
     var tangents = tangent_frame(upward.xyz / height, along.xyz);
     let position = hit.position;
     let to_eye = frame.eye.xyz - position;
-    let is_back = dot(face.normal.xyz, to_eye) < 0.0;
     if is_back {
         tangents = TangentFrame(tangents.tangent, -tangents.bitangent, -tangents.normal);
     }
@@ -216,8 +215,8 @@ fn radiance(face: Face, laid: CoatedFace, hit: Hit) -> vec3<f32> {
 
 @fragment
 fn lit(in: Fragment) -> @location(0) vec4<f32> {
-    let face = faces[in.face];
-    return vec4(displayed(radiance(face, coated[in.face], meet(face, in.at.xy))), 1.0);
+    // The outside is seen where the eye lies on the normal's side of the face's plane.
+    return vec4(displayed(radiance(coated[in.face], meet(in), in.plane.w > 0.0)), 1.0);
 }
 
 // Within 10⁻⁶ of the arctangent, 0 at (0, 0): the language promises less. Hastings, "Approximations for Digital
