@@ -1,6 +1,7 @@
 //! Graphics hardware, or Mesa's stand-in for it, draws what the reference defines. Without an adapter these tests
 //! skip, and say so.
 #![cfg(feature = "gpu")]
+#![allow(clippy::unwrap_used, reason = "a helper that fails fails its test")]
 
 #[path = "support/difference.rs"]
 mod difference;
@@ -12,14 +13,13 @@ use capture::btf::{Btf, Encoding, bonn_directions};
 use capture::{Camera, Distortion, Image};
 use difference::{Difference, difference};
 use geometry::TexturedMesh;
-use models::{layered, lumigraph};
+use models::{bumpy_ball, dyntex, lumigraph, still, vdtm};
 use nalgebra::{Matrix3, Point3, Vector3};
 use render::gpu::{Blend, Device, GpuError, Renderer, Shot, Target, wgpu};
 use render::material::{Coat, Coats, Light, Lighting, Lit};
 use render::{RenderOptions, cpu, reference};
 use std::sync::OnceLock;
 use support::{atlas, knot, look_at, sphere, surface, torus};
-use texture::Method;
 use texture::btf::{Budget, Precision, Sampler, gaussian_mixture, multilevel_vq};
 
 /// The one device of these tests.
@@ -201,7 +201,7 @@ fn what_does_not_fit_is_refused() {
     assert!(matches!(fault, GpuError::TooLarge { .. }) && fault.to_string().contains("let the CPU play"), "{fault}");
     mesh.atlas_size = [1 << 14, 1 << 14];
     assert!(matches!(Renderer::of_mesh(device, &mesh).unwrap_err(), GpuError::TooLarge { .. }));
-    let model = layered(Method::Vdtm, &torus(12, 8), 5000, [24, 20]);
+    let model = dyntex(bumpy_ball(3, [40, 30]), 5000, 1, |_| 1);
     let fault = Renderer::with_blend(device, &model, Blend::Adapter).unwrap_err();
     assert!(fault.to_string().contains("5000 layers"), "{fault}");
     assert!(Renderer::with_blend(device, &model, Blend::Cpu).is_ok());
@@ -263,13 +263,8 @@ fn contents(device: &Device, texture: &wgpu::Texture) -> Image<[u8; 4]> {
 #[test]
 fn every_method_is_drawn_alike_whoever_blends() {
     let Some(device) = device() else { return };
-    let mesh = torus(60, 24);
-    let models = [
-        layered(Method::Static, &mesh, 1, [96, 80]),
-        layered(Method::Vdtm, &mesh, 9, [96, 80]),
-        layered(Method::DynTex, &mesh, 20, [96, 80]),
-        lumigraph(&mesh, [70, 61]),
-    ];
+    let ball = || bumpy_ball(9, [200, 180]);
+    let models = [still(ball()), vdtm(ball(), 9), dyntex(ball(), 20, 30, |facet| 1 + facet % 20), lumigraph(ball(), 7)];
     let eyes = [[3.0, 0.4, 1.0], [0.3, -2.0, 2.0], [-1.6, 1.1, -0.6]];
     for (model, blend) in models.iter().flat_map(|m| [Blend::Adapter, Blend::Cpu].map(|blend| (m, blend))) {
         let mut renderer = Renderer::with_blend(device, model, blend).unwrap();
@@ -287,13 +282,9 @@ fn every_method_is_drawn_alike_whoever_blends() {
 /// A picture that does not follow the eye must not pass.
 #[test]
 fn the_methods_of_these_tests_depend_on_the_eye() {
-    let mesh = torus(60, 24);
+    let ball = || bumpy_ball(9, [200, 180]);
     let camera = look_at(Point3::new(3.0, 0.4, 1.0), Point3::origin(), 180.0, 201, 151);
-    for model in [
-        layered(Method::Vdtm, &mesh, 9, [96, 80]),
-        layered(Method::DynTex, &mesh, 20, [96, 80]),
-        lumigraph(&mesh, [70, 61]),
-    ] {
+    for model in [vdtm(ball(), 9), dyntex(ball(), 20, 30, |facet| 1 + facet % 20), lumigraph(ball(), 7)] {
         let seen = |eye: &Point3<f64>| cpu::render(&model.mesh, &model.atlas(eye), &camera, &at(2));
         let d = difference(&seen(&camera.center()), &seen(&Point3::new(0.3, -2.0, 2.0)));
         assert!(d.inner_off * 4 > d.inner, "{d:?}");
@@ -339,15 +330,16 @@ fn materials_are_lit_alike() {
     let mixture = mixture(&weave(Encoding::Srgb, true));
     let vq = vector_quantised(&weave(log, false));
     // A torus of one chart; spheres and knots whose cells carry the material in turns, and a tile far smaller than pixels.
-    let cases: [(&str, &dyn Sampler, Encoding, bool, TexturedMesh, f64, f64); 4] = [
-        ("mixture", &mixture, Encoding::Srgb, true, torus(60, 24), 0.2, 0.001),
-        ("vq", &vq, log, false, torus(60, 24), 0.2, 0.001),
-        ("vq in cells", &vq, log, false, sphere(40, 20), 0.3, 0.002),
-        ("vq from afar", &vq, log, false, knot(160, 12), 0.01, 0.002),
+    let [smooth, weave] = [(&mixture as &dyn Sampler, Encoding::Srgb, true), (&vq, log, false)];
+    let cases = [
+        ("mixture", smooth, torus(60, 24), 0.2, 0.001),
+        ("vq", weave, torus(60, 24), 0.2, 0.001),
+        ("vq in cells", weave, sphere(40, 20), 0.3, 0.002),
+        ("vq from afar", weave, knot(160, 12), 0.01, 0.002),
     ];
     let charts: Vec<u32> = (0..2000).step_by(2).collect();
     let atlas = atlas(128, 96);
-    for (name, sampler, encoding, includes_cosine, mesh, tile_size, most) in cases {
+    for (name, (sampler, encoding, includes_cosine), mesh, tile_size, most) in cases {
         let coat = Coat { charts: &charts, tile_size, sampler, encoding, exposure: 0.7, includes_cosine };
         let coats = Coats::new(&mesh, &[coat]);
         let lights = vec![

@@ -12,6 +12,7 @@
 //! - [`inspect`]: what a mesh, a model or a capture holds;
 //! - [`output`]: files and folders that appear whole or not at all;
 //! - [`panorama`]: light from all around;
+//! - [`projector`]: who draws a model's frames, graphics hardware or the CPU;
 //! - [`serve`]: a model and its player on loopback;
 //! - [`shading`]: how the object is lit over a turn;
 //! - [`stages`]: what each stage costs;
@@ -31,6 +32,7 @@ pub mod output;
 pub mod panorama;
 pub mod pipeline;
 pub mod playback;
+pub mod projector;
 mod selection;
 pub mod serve;
 pub mod shading;

@@ -8,9 +8,12 @@ use texture::Model;
 /// Of materials that are synthesized.
 const SEED: u64 = 1;
 
-/// Draws a model as every report does: 2 × 2 sub-samples, transparent where there is nothing.
+/// How every report draws: 2 × 2 sub-samples, transparent where there is nothing.
+pub const OPTIONS: RenderOptions = RenderOptions { supersample: 2, background: None };
+
+/// Draws a model as every report does.
 pub fn player(model: &Model) -> Player<'_> {
-    Player::new(&model.mesh, RenderOptions { supersample: 2, background: None })
+    Player::new(&model.mesh, OPTIONS)
 }
 
 /// What answers for the texels of a model's materials, one each.

@@ -9,12 +9,14 @@ use super::device::{Device, cover};
 use bytemuck::cast_slice;
 use nalgebra::Point3;
 use rayon::prelude::*;
-use texture::{FacetWeights, Layers};
+use texture::{Layer, Layers};
 
 /// The layers on the adapter.
 #[derive(Debug)]
 pub(super) struct LayerBlend<'a> {
     layers: &'a Layers,
+    /// Per facet: what `weights` in `layers.wgsl` says.
+    entries: Vec<[f32; 2]>,
     weights: wgpu::Buffer,
     pipeline: wgpu::RenderPipeline,
     bindings: wgpu::BindGroup,
@@ -45,31 +47,21 @@ impl<'a> LayerBlend<'a> {
         let textures = [&array, &map].map(wgpu::BindingResource::TextureView);
         let [array, map] = textures;
         let bindings = device.bind(&pipeline, 0, &[array, map, weights.as_entire_binding(), row.as_entire_binding()]);
-        Ok(Self { layers, weights, pipeline, bindings })
+        Ok(Self { layers, entries: Vec::new(), weights, pipeline, bindings })
     }
 
-    /// Takes the weights for an eye to the adapter.
-    pub(super) fn weigh(&self, device: &Device, eye: &Point3<f64>) {
+    /// Takes the weights for an eye to the adapter; false where they are what they were.
+    pub(super) fn weigh(&mut self, device: &Device, eye: &Point3<f64>) -> bool {
         let row = self.layers.layers.len() + 1;
         let mut entries = vec![[0.0f32; 2]; row * self.layers.facets.len()];
         let rows = entries.par_chunks_mut(row).zip(&self.layers.facets);
-        rows.for_each(|(row, facet)| self.write(row, facet, eye));
-        device.queue().write_buffer(&self.weights, 0, cast_slice(entries.as_flattened()));
-    }
-
-    /// What is not zero: a texel's value is bias + Σ gain · texel.
-    fn write(&self, row: &mut [[f32; 2]], facet: &FacetWeights, eye: &Point3<f64>) {
-        let (mut bias, mut terms) = (0.0, 0);
-        for (k, (layer, weight)) in self.layers.layers.iter().zip(facet.at(eye)).enumerate() {
-            if weight == 0.0 {
-                continue;
-            }
-            terms += 1;
-            bias += weight * layer.offset;
-            // The texture holds shares of 255.
-            row[terms] = [255.0 * weight * layer.scale, k as f32];
+        rows.for_each(|(row, facet)| write(row, &self.layers.layers, &facet.at(eye)));
+        if entries == self.entries {
+            return false;
         }
-        row[0] = [bias, terms as f32];
+        self.entries = entries;
+        device.queue().write_buffer(&self.weights, 0, cast_slice(self.entries.as_flattened()));
+        true
     }
 
     /// Blends them into level 0 of the atlas.
@@ -77,4 +69,16 @@ impl<'a> LayerBlend<'a> {
         let target = (atlas.finest(), wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT));
         cover(encoder, &self.pipeline, &self.bindings, target, ([0, 0], atlas.size()));
     }
+}
+
+/// What is not zero: a texel's value is bias + Σ gain · texel.
+fn write(row: &mut [[f32; 2]], layers: &[Layer], weights: &[f32]) {
+    let (mut bias, mut terms) = (0.0, 0);
+    for (k, (layer, &weight)) in layers.iter().zip(weights).enumerate().filter(|(_, (_, weight))| **weight != 0.0) {
+        terms += 1;
+        bias += weight * layer.offset;
+        // The texture holds shares of 255.
+        row[terms] = [255.0 * weight * layer.scale, k as f32];
+    }
+    row[0] = [bias, terms as f32];
 }

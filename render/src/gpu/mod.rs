@@ -45,7 +45,7 @@ use readback::Readback;
 use std::time::{Duration, Instant};
 use surface::Surface;
 use texture::{Appearance, Method, Model};
-use tiles::{Samples, Tile, tiles};
+use tiles::{Canvas, Tile, tiles};
 
 /// Who blends the layers of a model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -100,7 +100,7 @@ pub struct Renderer<'a> {
     dress: Option<Dress>,
     /// The eye the atlas is for.
     seen: Option<Point3<f64>>,
-    samples: Option<Samples>,
+    canvas: Option<Canvas>,
     readback: Option<Readback>,
     times: StageTimes,
 }
@@ -167,7 +167,7 @@ impl<'a> Renderer<'a> {
                 source: Source::Given,
                 dress: None,
                 seen: None,
-                samples: None,
+                canvas: None,
                 readback: None,
                 times: StageTimes::default(),
             })
@@ -272,7 +272,7 @@ impl<'a> Renderer<'a> {
         self.seen = Some(*eye);
         let start = Instant::now();
         let mut encoder = self.encoder();
-        match &self.source {
+        match &mut self.source {
             Source::Given => {}
             Source::Blended(model) => {
                 let atlas = model.atlas(eye);
@@ -280,7 +280,9 @@ impl<'a> Renderer<'a> {
                 self.atlas.upload(&self.device, &atlas);
             }
             Source::Layers(layers) => {
-                layers.weigh(&self.device, eye);
+                if !layers.weigh(&self.device, eye) {
+                    return;
+                }
                 self.times.weights = start.elapsed();
                 layers.blend(&mut encoder, &self.atlas);
             }
@@ -308,7 +310,7 @@ impl<'a> Renderer<'a> {
         let start = Instant::now();
         let size = tile.size.map(|side| side as u32);
         let readback = match self.readback.take() {
-            Some(kept) if kept.size() == size => kept,
+            Some(kept) if kept.fits(size) => kept,
             _ => Readback::new(&self.device, size),
         };
         let mut encoder = self.encoder();
@@ -334,20 +336,20 @@ impl<'a> Renderer<'a> {
         target: &Target<'_>,
         origin: [usize; 2],
     ) -> Result<(), GpuError> {
-        let samples = match self.samples.take() {
-            Some(kept) if kept.fit(tile, &shot.options, target.format) => kept,
-            _ => Samples::new(&self.device, tile, &shot.options, target.format)?,
+        let mut canvas = match self.canvas.take() {
+            Some(kept) if kept.fits(target.format) => kept,
+            _ => Canvas::new(&self.device, target.format)?,
         };
         self.surface.look(&self.device, shot.camera, &shot.options, tile, &self.atlas);
         let dress = self.dress.as_ref().filter(|_| shot.lighting.is_some());
-        let mut pass = samples.fill(encoder);
+        let mut pass = canvas.fill(&self.device, encoder, tile, &shot.options);
         self.surface.draw(&mut pass, &self.bindings, dress.map(|dress| &dress.bare));
         if let Some(dress) = dress {
             dress.draw(&mut pass);
         }
         drop(pass);
-        samples.resolve(&self.device, encoder, target.view, origin, &shot.options);
-        self.samples = Some(samples);
+        canvas.resolve(&self.device, encoder, tile, &shot.options, (target.view, origin));
+        self.canvas = Some(canvas);
         Ok(())
     }
 

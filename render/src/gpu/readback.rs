@@ -31,8 +31,9 @@ impl Readback {
         Self { size: [width, height], texture, view, buffer }
     }
 
-    pub(super) fn size(&self) -> [u32; 2] {
-        self.size
+    /// Whether a tile of `size` pixels fits.
+    pub(super) fn fits(&self, size: [u32; 2]) -> bool {
+        (0..2).all(|k| self.size[k] >= size[k])
     }
 
     pub(super) fn target(&self) -> &wgpu::TextureView {

@@ -28,16 +28,22 @@ struct Options {
     is_srgb: u32,
 }
 
-/// Sub-samples of a tile, and the way to pixels of one format.
+/// Sub-samples, and the way from them to pixels of one format.
 #[derive(Debug)]
-pub(super) struct Samples {
-    /// Sub-samples across and down.
-    size: [u32; 2],
-    color: wgpu::TextureView,
-    depth: wgpu::TextureView,
+pub(super) struct Canvas {
     format: wgpu::TextureFormat,
     options: wgpu::Buffer,
     resolve: wgpu::RenderPipeline,
+    samples: Option<Samples>,
+}
+
+/// Room for sub-samples.
+#[derive(Debug)]
+struct Samples {
+    /// Across and down.
+    size: [u32; 2],
+    color: wgpu::TextureView,
+    depth: wgpu::TextureView,
     bindings: wgpu::BindGroup,
 }
 
@@ -51,35 +57,74 @@ pub(super) fn tiles([width, height]: [usize; 2], options: &RenderOptions) -> Vec
         .collect()
 }
 
-impl Samples {
-    /// Room for the sub-samples of `tile`.
-    pub(super) fn new(
+impl Canvas {
+    pub(super) fn new(device: &Device, format: wgpu::TextureFormat) -> Result<Self, GpuError> {
+        let resolve = device.covering(include_str!("resolve.wgsl"), "resolve", format);
+        let options = device.buffer(&[0; size_of::<Options>()], wgpu::BufferUsages::UNIFORM)?;
+        Ok(Self { format, options, resolve, samples: None })
+    }
+
+    /// Whether it makes pixels of a format.
+    pub(super) fn fits(&self, format: wgpu::TextureFormat) -> bool {
+        self.format == format
+    }
+
+    /// A pass over the sub-samples of a tile, for which there is room afterwards.
+    pub(super) fn fill<'e>(
+        &mut self,
         device: &Device,
+        encoder: &'e mut wgpu::CommandEncoder,
         tile: &Tile,
         options: &RenderOptions,
-        format: wgpu::TextureFormat,
-    ) -> Result<Self, GpuError> {
+    ) -> wgpu::RenderPass<'e> {
         let size = tile.size.map(|side| (side * options.per_side()) as u32);
+        let samples = match self.samples.take() {
+            Some(kept) if (0..2).all(|k| kept.size[k] >= size[k]) => kept,
+            _ => Samples::new(device, size, &self.resolve, &self.options),
+        };
+        let mut pass = self.samples.insert(samples).pass(encoder);
+        pass.set_viewport(0.0, 0.0, size[0] as f32, size[1] as f32, 0.0, 1.0);
+        pass
+    }
+
+    /// Averages the sub-samples of a tile into the pixels of a target from `origin` on. The rest of the target stays as it
+    /// is, or is cleared where that is its corner.
+    pub(super) fn resolve(
+        &self,
+        device: &Device,
+        encoder: &mut wgpu::CommandEncoder,
+        tile: &Tile,
+        options: &RenderOptions,
+        (target, origin): (&wgpu::TextureView, [usize; 2]),
+    ) {
+        let Some(samples) = &self.samples else { return };
+        let origin = origin.map(|o| o as u32);
+        let [r, g, b] = options.background.unwrap_or_default().map(f32::from);
+        let background = [r, g, b, if options.background.is_some() { 1.0 } else { 0.0 }];
+        let (per_side, is_srgb) = (options.per_side() as u32, u32::from(self.format.is_srgb()));
+        let numbers = Options { background, origin, per_side, is_srgb };
+        device.queue().write_buffer(&self.options, 0, bytemuck::bytes_of(&numbers));
+        let load = if origin == [0, 0] { wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT) } else { wgpu::LoadOp::Load };
+        let size = tile.size.map(|side| side as u32);
+        cover(encoder, &self.resolve, &samples.bindings, (target, load), (origin, size));
+    }
+}
+
+impl Samples {
+    fn new(device: &Device, size: [u32; 2], resolve: &wgpu::RenderPipeline, options: &wgpu::Buffer) -> Self {
         let usage = wgpu::TextureUsages::RENDER_ATTACHMENT;
         let view = |format, usage| {
             let texture = device.texture(size, [1, 1], format, usage);
             texture.create_view(&wgpu::TextureViewDescriptor::default())
         };
         let color = view(FORMAT, usage | wgpu::TextureUsages::TEXTURE_BINDING);
-        let resolve = device.covering(include_str!("resolve.wgsl"), "resolve", format);
-        let options = device.buffer(&[0; size_of::<Options>()], wgpu::BufferUsages::UNIFORM)?;
         let texture = wgpu::BindingResource::TextureView(&color);
-        let bindings = device.bind(&resolve, 0, &[texture, options.as_entire_binding()]);
-        Ok(Self { size, depth: view(DEPTH, usage), color, format, options, resolve, bindings })
+        let bindings = device.bind(resolve, 0, &[texture, options.as_entire_binding()]);
+        Self { size, depth: view(DEPTH, usage), color, bindings }
     }
 
-    /// Whether these are the sub-samples of such a tile.
-    pub(super) fn fit(&self, tile: &Tile, options: &RenderOptions, format: wgpu::TextureFormat) -> bool {
-        self.size == tile.size.map(|side| (side * options.per_side()) as u32) && self.format == format
-    }
-
-    /// A pass that fills the sub-samples.
-    pub(super) fn fill<'e>(&self, encoder: &'e mut wgpu::CommandEncoder) -> wgpu::RenderPass<'e> {
+    /// A pass that begins with nothing.
+    fn pass<'e>(&self, encoder: &'e mut wgpu::CommandEncoder) -> wgpu::RenderPass<'e> {
         let store = wgpu::StoreOp::Store;
         let color = wgpu::RenderPassColorAttachment {
             view: &self.color,
@@ -97,28 +142,6 @@ impl Samples {
             depth_stencil_attachment: Some(depth),
             ..Default::default()
         })
-    }
-
-    /// Averages them into the pixels of a target from `origin` on. The rest of the target stays as it is, or is cleared
-    /// where the tile is the first.
-    pub(super) fn resolve(
-        &self,
-        device: &Device,
-        encoder: &mut wgpu::CommandEncoder,
-        target: &wgpu::TextureView,
-        origin: [usize; 2],
-        options: &RenderOptions,
-    ) {
-        let origin = origin.map(|o| o as u32);
-        let [r, g, b] = options.background.unwrap_or_default().map(f32::from);
-        let per_side = options.per_side() as u32;
-        let background = [r, g, b, if options.background.is_some() { 1.0 } else { 0.0 }];
-        let is_srgb = u32::from(self.format.is_srgb());
-        let numbers = Options { background, origin, per_side, is_srgb };
-        device.queue().write_buffer(&self.options, 0, bytemuck::bytes_of(&numbers));
-        let size = self.size.map(|side| side / per_side);
-        let load = if origin == [0, 0] { wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT) } else { wgpu::LoadOp::Load };
-        cover(encoder, &self.resolve, &self.bindings, (target, load), (origin, size));
     }
 }
 

@@ -2,13 +2,13 @@
 
 use super::{read_capture, read_file};
 use crate::Answer;
-use crate::arguments::RenderArgs;
+use crate::arguments::{RenderArgs, RendererArg};
 use serde_json::json;
 use std::time::Instant;
 use turnlight::capture::{Aabb, Camera, Capture, Image};
 use turnlight::output::OutputFolder;
+use turnlight::projector::{Choice, Projector};
 use turnlight::render::film::write_png;
-use turnlight::render::material::Lit;
 use turnlight::render::path::{turntable_cameras, up_axis};
 use turnlight::stages::{Observer, Stages};
 use turnlight::texture::Model;
@@ -32,14 +32,15 @@ pub(crate) fn run(args: &RenderArgs, observer: &dyn Observer) -> Result<Answer, 
     let cameras = cameras(args, &model)?;
     let folder = args.output.as_deref().map(OutputFolder::create).transpose()?;
     let mut times_ms = Vec::with_capacity(cameras.len());
-    stages.run("render", |observer| draw(&model, &cameras, args, folder.as_ref(), &mut times_ms, observer))?;
+    let device =
+        stages.run("render", |observer| draw(&model, &cameras, args, folder.as_ref(), &mut times_ms, observer))?;
     if let Some(folder) = folder {
         folder.finish()?;
     }
-    Ok(answer(args, &cameras, &times_ms, &stages))
+    Ok(answer(args, &cameras, (&times_ms, &device), &stages))
 }
 
-fn answer(args: &RenderArgs, cameras: &[Numbered], times_ms: &[f64], stages: &Stages<'_>) -> Answer {
+fn answer(args: &RenderArgs, cameras: &[Numbered], (times_ms, device): (&[f64], &str), stages: &Stages<'_>) -> Answer {
     let size = cameras.first().map_or([0, 0], |(_, c)| [c.intrinsics.width, c.intrinsics.height]);
     let mut sorted = times_ms.to_vec();
     sorted.sort_by(f64::total_cmp);
@@ -53,7 +54,7 @@ fn answer(args: &RenderArgs, cameras: &[Numbered], times_ms: &[f64], stages: &St
         "width": size[0],
         "height": size[1],
         "frame_ms": frame_ms,
-        "frame_device": format!("cpu, {} threads", rayon::current_num_threads()),
+        "frame_device": device,
         "output": args.output,
         "video": args.video,
         "stages": stages.finished(),
@@ -88,7 +89,7 @@ fn orbit(args: &RenderArgs, model: &Model, capture: Option<&Capture>, n: usize) 
     turntable_cameras(&aabb, like, n, size[0], size[1], up)
 }
 
-/// Draws every frame once, to the folder and to the film.
+/// Draws every frame once, to the folder and to the film; says what drew them.
 fn draw(
     model: &Model,
     cameras: &[Numbered],
@@ -96,19 +97,21 @@ fn draw(
     folder: Option<&OutputFolder>,
     times_ms: &mut Vec<f64>,
     observer: &dyn Observer,
-) -> Result<(), Error> {
-    let mut player = playback::player(model);
+) -> Result<String, Error> {
     let tiles = playback::tiles(model);
     let coats = playback::coats(model, &tiles);
+    let choice = match args.renderer {
+        RendererArg::Auto => Choice::Auto,
+        RendererArg::Cpu => Choice::Cpu,
+        RendererArg::Gpu => Choice::Gpu,
+    };
+    let mut projector = Projector::new(model, coats.as_ref(), choice)?;
     let lamps = args.light.lamps(model.mesh.mesh.aabb().map_or([0.0; 3], |aabb| aabb.center().into()))?;
     let mut frame = |i: usize, camera: &Camera| {
         let start = Instant::now();
-        let atlas = model.atlas(&camera.center());
-        let frame = match &coats {
-            None => player.render(&atlas, camera),
-            Some(coats) => player.render_lit(&atlas, &Lit { coats, lighting: &lamps.seen_by(camera) }, camera),
-        };
+        let frame = projector.frame(camera, &lamps.seen_by(camera));
         times_ms.push(start.elapsed().as_secs_f64() * 1e3);
+        projector.take_note().iter().for_each(|note| observer.noted(note));
         observer.advanced(i + 1, cameras.len());
         frame
     };
@@ -128,5 +131,5 @@ fn draw(
         Some(video) => film::write_film(video, frames, args.fps)?,
         None => frames.for_each(drop),
     }
-    fault.map_or(Ok(()), Err)
+    fault.map_or(Ok(projector.device().to_owned()), Err)
 }
