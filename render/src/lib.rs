@@ -18,6 +18,7 @@
 //! mip level; filtering is isotropic, so surfaces at grazing angles blur along the far direction;
 //! frames beyond [`MAX_PIXELS`] come back empty; of two faces at the very same depth either may show.
 
+pub mod blender;
 pub mod cpu;
 mod error;
 mod face;

@@ -1,6 +1,8 @@
-//! What the whole-pipeline tests share: the command, captures to break, and where real data lies.
+//! What the whole-pipeline tests share: the command, captures and models to break, and where real data lies.
 
 pub mod cartoon;
+pub mod hostile;
+pub mod played;
 
 use data_synth::{Effort, Scene, SynthOptions, synthesize};
 use std::path::{Path, PathBuf};

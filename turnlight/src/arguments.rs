@@ -57,7 +57,7 @@ pub(crate) enum Command {
     Compare(CompareArgs),
     /// Film a synthetic object, model it, compare the methods
     Demo(DemoArgs),
-    /// Write a model for the browser, or as a mesh with one picture
+    /// Write a model for the browser, for Blender, or as a mesh with one picture
     Export(ExportArgs),
     /// Make the visual hull alone (.ply .obj .glb)
     Hull(HullArgs),
@@ -82,6 +82,8 @@ pub(crate) enum Command {
 pub(crate) enum ExportTarget {
     /// A folder with a player, for any static web server
     Web,
+    /// A folder with an add-on that imports the model and plays it for the camera
+    Blender,
     /// Mesh, material and the static look (.obj .mtl .png)
     Obj,
 }

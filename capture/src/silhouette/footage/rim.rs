@@ -1,12 +1,14 @@
 //! Coverage at the edge of a silhouette, from the colours on both sides of it.
 //!
-//! A pixel there is `α F + (1 − α) B` in linear light. `F` is the mean of the object near by, `B` what is known to be
-//! behind, in the light it has near by; α is the projection of the pixel onto the line between them. Of an object that is
-//! not of one colour it says little: with the variance `v` that the colours of the object and noise give it, and `a` what
-//! the silhouette alone says, give or take σ, α is `(α / v + a / σ²) / (1 / v + 1 / σ²)`. In the end the edge is evened
-//! along itself.
+//! A pixel there is `α F + (1 − α) B`, of encoded levels: a lens mixes light, but a film its hues only after encoding,
+//! over 2 × 2 pixels, and before a coloured backdrop it is the hue that differs. `F` is the mean of the object near by,
+//! `B` what is known to be behind, in the light it has near by; α is the projection of the pixel onto the line between
+//! them. Of an object that is not of one colour it says little: with the variance `v` that the colours of the object and
+//! noise give it, and `a` what the silhouette alone says, give or take σ, α is `(α / v + a / σ²) / (1 / v + 1 / σ²)`. In
+//! the end the edge is evened along itself. All of it is done twice: a silhouette that takes mixed pixels for the object
+//! takes their mean for the object's colour, too.
 
-use super::light::{Toned, linear};
+use super::light::Toned;
 use crate::Image;
 use crate::matte::{blur, signed_distance};
 
@@ -19,7 +21,7 @@ const REACH: isize = 5;
 /// Error of the coverage that a silhouette without steps between pixels says.
 const MASK_ERROR: f32 = 0.5;
 
-/// Error of what is thought to be behind, of linear light: of white, and as a share of the brighter side.
+/// Error of what is thought to be behind, encoded: of white, and as a share of the brighter side.
 const BACKGROUND_ERROR: (f32, f32) = (0.004, 0.05);
 
 /// Pixels along the edge (standard deviation) that share their errors.
@@ -27,11 +29,15 @@ const EVENED: f32 = 1.0;
 
 /// The matte to a silhouette (≥ 128) of `picture`, given what is behind it (encoded levels) where that is known.
 pub(super) fn refined(picture: &Toned, background: &Image<Option<[f32; 3]>>, mask: &Image<u8>) -> Image<u8> {
+    refined_once(picture, background, &refined_once(picture, background, mask))
+}
+
+fn refined_once(picture: &Toned, background: &Image<Option<[f32; 3]>>, mask: &Image<u8>) -> Image<u8> {
     let (width, height) = (mask.width(), mask.height());
     let distance = signed_distance(mask);
     let soft = blur(&mask.map(f32::from), 0.7);
-    let light = |x: usize, y: usize| picture.at(x, y).map(linear);
-    let behind = |x: usize, y: usize| background.at(x, y).map(|b| b.map(linear));
+    let colour = |x: usize, y: usize| picture.at(x, y).map(|v| v / 255.0);
+    let behind = |x: usize, y: usize| background.at(x, y).map(|b| b.map(|v| v / 255.0));
     let mut matte = mask.map(|v| if v >= 128 { 1.0 } else { 0.0 });
     for y in 0..height {
         for x in 0..width {
@@ -39,8 +45,8 @@ pub(super) fn refined(picture: &Toned, background: &Image<Option<[f32; 3]>>, mas
                 continue;
             }
             let expected = soft.at(x, y) / 255.0;
-            let sides = sides(x, y, &distance, &light, &behind);
-            matte.set(x, y, sides.map_or(expected, |sides| sides.coverage(&light(x, y), expected)));
+            let sides = sides(x, y, &distance, &colour, &behind);
+            matte.set(x, y, sides.map_or(expected, |sides| sides.coverage(&colour(x, y), expected)));
         }
     }
     evened(&matte)
@@ -54,10 +60,10 @@ fn evened(matte: &Image<f32>) -> Image<u8> {
     blur(matte, f64::from(EVENED)).map(|v| (255.0 * steep(v)).round() as u8)
 }
 
-/// Linear light on both sides of the edge.
+/// Encoded colours on both sides of the edge, white = 1.
 struct Sides {
     object: [f32; 3],
-    /// Of the object's light, per channel.
+    /// Of the object's colour, per channel.
     variance: [f32; 3],
     background: [f32; 3],
 }
@@ -85,7 +91,7 @@ fn sides(
     x: usize,
     y: usize,
     distance: &Image<f32>,
-    light: &impl Fn(usize, usize) -> [f32; 3],
+    colour: &impl Fn(usize, usize) -> [f32; 3],
     behind: &impl Fn(usize, usize) -> Option<[f32; 3]>,
 ) -> Option<Sides> {
     let (mut object, mut squares, mut object_weight) = ([0.0_f32; 3], [0.0_f32; 3], 0.0_f32);
@@ -105,7 +111,7 @@ fn sides(
             }
             let squared = ((u as f32 - x as f32).powi(2) + (v as f32 - y as f32).powi(2)) / (REACH * REACH) as f32;
             let weight = (-2.0 * squared).exp();
-            let colour = light(u, v);
+            let colour = colour(u, v);
             if d > 0.0 {
                 (0..3).for_each(|c| object[c] += weight * colour[c]);
                 (0..3).for_each(|c| squares[c] += weight * colour[c] * colour[c]);

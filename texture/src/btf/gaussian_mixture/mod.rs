@@ -20,7 +20,7 @@
 //!
 //! **Cost**: samples × M × the share that is not left out (half of 300, less of more) × rounds, the first third of
 //! which take 4 % of the samples; in memory M × (lights + views) sums for each of 32 parts and M² for the refit.
-//! An answer: M densities of six variables, sixteen at a time.
+//! An answer: M densities of six variables, sixteen at a time; those of light and eye once for texels asked for together.
 //!
 //! **Limits**: structures and highlights sharper than the components are wide are blurred, and of a tile whose
 //! texels hardly resemble their neighbours little more than the mean picture is left; the tile does not continue
@@ -235,11 +235,20 @@ impl Sampler for GaussianMixture {
     }
 
     fn value(&self, texel: usize, light: &Vector3<f32>, view: &Vector3<f32>) -> [f32; 3] {
-        let (x, y) = (texel % self.frame.width, texel / self.frame.width);
-        let [la, ls, va, vs] = angles(light, view);
-        let mean = self.mean_colour(light, view);
-        let found = prediction::one(&self.packed, [x as f32 + 0.5, y as f32 + 0.5, la, ls, va, vs]);
-        [0, 1, 2].map(|c| mean[c] + found[c])
+        let mut out = [[0.0; 3]];
+        self.values(&[texel], light, view, &mut out);
+        out[0]
+    }
+
+    fn values(&self, texels: &[usize], light: &Vector3<f32>, view: &Vector3<f32>, out: &mut [[f32; 3]]) {
+        let (angles, mean) = (angles(light, view), self.mean_colour(light, view));
+        let place = |texel: usize| [texel % self.frame.width, texel / self.frame.width].map(|v| v as f32 + 0.5);
+        for (texels, out) in texels.chunks(prediction::FEW).zip(out.chunks_mut(prediction::FEW)) {
+            let mut places = [[0.0; 2]; prediction::FEW];
+            places.iter_mut().zip(texels).for_each(|(to, &texel)| *to = place(texel));
+            prediction::few(&self.packed, angles, &places[..texels.len()], out);
+            out.iter_mut().zip(texels).for_each(|(out, _)| (0..3).for_each(|c| out[c] += mean[c]));
+        }
     }
 
     fn picture(&self, light: &Vector3<f32>, view: &Vector3<f32>) -> Vec<f32> {

@@ -15,6 +15,9 @@ pub(super) const REACH: f32 = 18.0;
 /// Vectors of logarithms kept at a time.
 const BLOCK: usize = 64;
 
+/// Places asked for at once: four of bilinear interpolation, sixteen of a wider footprint.
+pub(super) const FEW: usize = 4;
+
 /// Colours less the mean over a grid of texels, (y, x, channel), α and s of light and view given.
 pub(super) fn picture(mixture: &Packed, x: &[f32], y: &[f32], angles: [f32; 4]) -> Vec<f32> {
     let mut out = vec![0.0; 3 * x.len() * y.len()];
@@ -66,58 +69,111 @@ fn mixed<V: Vector>(mixture: &Packed, likely: &Likely, row: usize) -> [Row; 3] {
 }
 
 kernel! {
-    /// Colour less the mean for one place, light and view.
-    fn one(mixture: &Packed, at: [f32; INPUTS]) -> [f32; 3] = one_with
+    /// Colours less the mean of up to [`FEW`] places under one light and view: one of `out` for each of `places`, as long
+    /// as both last.
+    fn few(mixture: &Packed, angles: [f32; 4], places: &[[f32; 2]], out: &mut [[f32; 3]]) = few_with
 }
 
 #[inline(always)]
-pub(super) fn one_with<V: Vector>(mixture: &Packed, at: [f32; INPUTS]) -> [f32; 3] {
-    let mut logs = [[0.0; LANES]; BLOCK];
-    let mut sums = [V::splat(0.0); 4];
-    let mut best = f32::NEG_INFINITY;
+pub(super) fn few_with<V: Vector>(mixture: &Packed, angles: [f32; 4], places: &[[f32; 2]], out: &mut [[f32; 3]]) {
+    let (mut energies, mut logs) = ([[0.0; LANES]; BLOCK], [[0.0; LANES]; BLOCK]);
+    let mut answers = [Answer::<V>::none(); FEW];
     let vectors = mixture.input.len() / LANES;
     for first in (0..vectors).step_by(BLOCK) {
-        let count = BLOCK.min(vectors - first);
-        let top = logarithms::<V>(mixture, at, first, &mut logs[..count]);
-        if top > best {
-            let factor = V::splat(if best == f32::NEG_INFINITY { 0.0 } else { (best - top).exp() });
-            for sum in &mut sums {
-                *sum = sum.times(factor);
-            }
-            best = top;
-        }
-        for (g, logs) in logs[..count].iter().enumerate() {
-            let log = V::load(logs).minus(V::splat(best));
-            if log.at_least(V::splat(-REACH)) == 0 {
-                continue;
-            }
-            let share = log.exp();
-            sums[3] = sums[3].plus(share);
-            for c in 0..3 {
-                let means = mixture.mean[INPUTS + c].as_chunks::<LANES>().0;
-                sums[c] = share.times_plus(V::load(&means[first + g]), sums[c]);
-            }
+        let block = first..vectors.min(first + BLOCK);
+        let (energies, logs) = (&mut energies[..block.len()], &mut logs[..block.len()]);
+        angular::<V>(mixture, angles, first, energies);
+        for (answer, &place) in answers.iter_mut().zip(places) {
+            let top = at_place::<V>(mixture, energies, place, first, logs);
+            answer.take(mixture, logs, top, first);
         }
     }
-    let total = sums[3].sum();
-    [sums[0].sum() / total, sums[1].sum() / total, sums[2].sum() / total]
+    for ((out, answer), _) in out.iter_mut().zip(&answers).zip(places) {
+        *out = answer.colour();
+    }
 }
 
-/// Log densities of the inputs, of the vectors of components from `first` on; the largest.
+/// `ln w − Σ ln σ − ½ Σ z²` over the angles, of the vectors of components from `first` on.
 #[inline(always)]
-fn logarithms<V: Vector>(mixture: &Packed, at: [f32; INPUTS], first: usize, out: &mut [Row]) -> f32 {
-    let mut top = V::splat(f32::NEG_INFINITY);
+fn angular<V: Vector>(mixture: &Packed, angles: [f32; 4], first: usize, out: &mut [Row]) {
     for (g, out) in out.iter_mut().enumerate() {
         let mut log = V::load(&mixture.input.as_chunks::<LANES>().0[first + g]);
-        for v in 0..INPUTS {
-            let mean = V::load(&mixture.mean[v].as_chunks::<LANES>().0[first + g]);
-            let scale = V::load(&mixture.scale[v].as_chunks::<LANES>().0[first + g]);
-            log = log.less_square(V::splat(at[v]).minus(mean).times(scale));
+        for (v, &angle) in angles.iter().enumerate() {
+            log = log.less_square(scaled(mixture, 2 + v, first + g, angle));
         }
+        log.store(out);
+    }
+}
+
+/// Log densities of all inputs where `energies` has what the angles say; the largest.
+#[inline(always)]
+fn at_place<V: Vector>(mixture: &Packed, energies: &[Row], place: [f32; 2], first: usize, out: &mut [Row]) -> f32 {
+    let mut top = V::splat(f32::NEG_INFINITY);
+    for (g, (out, energy)) in out.iter_mut().zip(energies).enumerate() {
+        let across = scaled(mixture, 0, first + g, place[0]);
+        let log = V::load(energy).less_square(across).less_square(scaled(mixture, 1, first + g, place[1]));
         log.store(out);
         top = top.larger(log);
     }
     top.largest()
+}
+
+/// Differences of a variable from the means of a vector of components, over σ √2.
+#[inline(always)]
+fn scaled<V: Vector>(mixture: &Packed, variable: usize, vector: usize, at: f32) -> V {
+    let mean = V::load(&mixture.mean[variable].as_chunks::<LANES>().0[vector]);
+    let scale = V::load(&mixture.scale[variable].as_chunks::<LANES>().0[vector]);
+    V::splat(at).minus(mean).times(scale)
+}
+
+/// Sums over components as far as they were looked at.
+#[derive(Clone, Copy)]
+struct Answer<V> {
+    /// The largest logarithm so far: all sums are over its exponential.
+    best: f32,
+    /// Of shares times red, green, blue, and of shares.
+    sums: [V; 4],
+}
+
+impl<V: Vector> Answer<V> {
+    #[inline(always)]
+    fn none() -> Self {
+        Self { best: f32::NEG_INFINITY, sums: [V::splat(0.0); 4] }
+    }
+
+    /// Takes the vectors of components from `first` on in, of logarithms up to `top`.
+    #[inline(always)]
+    fn take(&mut self, mixture: &Packed, logs: &[Row], top: f32, first: usize) {
+        self.raise(top);
+        for (g, log) in logs.iter().enumerate() {
+            let log = V::load(log).minus(V::splat(self.best));
+            if log.at_least(V::splat(-REACH)) == 0 {
+                continue;
+            }
+            let share = log.exp();
+            self.sums[3] = self.sums[3].plus(share);
+            for c in 0..3 {
+                let means = mixture.mean[INPUTS + c].as_chunks::<LANES>().0;
+                self.sums[c] = share.times_plus(V::load(&means[first + g]), self.sums[c]);
+            }
+        }
+    }
+
+    /// Sums over the exponential of a larger logarithm.
+    #[inline(always)]
+    fn raise(&mut self, top: f32) {
+        if top > self.best {
+            let factor = V::splat(if self.best == f32::NEG_INFINITY { 0.0 } else { (self.best - top).exp() });
+            self.sums = self.sums.map(|sum| sum.times(factor));
+            self.best = top;
+        }
+    }
+
+    #[inline(always)]
+    fn colour(&self) -> [f32; 3] {
+        let total = self.sums[3].sum();
+        [0, 1, 2].map(|c| self.sums[c].sum() / total)
+    }
 }
 
 /// Mean squared difference between the pictures of `pairs` and what is expected of them, encoded units.
