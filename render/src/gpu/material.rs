@@ -262,7 +262,8 @@ fn of_vq(tables: &VqTables) -> (Vec<u32>, [[u32; 4]; 4]) {
     let color_rows = row.here();
     row.floats(tables.color_rows.as_flattened());
     let grid = [tables.grid.alpha, tables.grid.beta, tables.grid.theta, tables.grid.phi].map(|nodes| nodes as u32);
+    let rim = f32::from(tables.grid.rim_deg).to_radians();
     let along = u32::from(tables.grid.axis == texture::btf::multilevel_vq::Axis::Along);
     let lists = [[along, tables.plane.len() as u32, 0, plane], [texels, views, slices, rows]];
-    (row.0, [grid, lists[0], lists[1], [color_slices, color_rows, 0, 0]])
+    (row.0, [grid, lists[0], lists[1], [color_slices, color_rows, rim.to_bits(), 0]])
 }

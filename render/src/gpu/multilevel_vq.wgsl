@@ -1,6 +1,7 @@
 // Multi-level vector quantisation: chains of look-ups; `texture::btf::multilevel_vq`.
 // tables[0]: slices, cells, polar angles, azimuths of the grid. tables[1]: 1 where the light's poles lie along the view's
-// azimuth; links of P6; first of turns; of P6. tables[2]: first of P4, P3, P2, P1. tables[3]: first of I2, of I1's colours.
+// azimuth; links of P6; first of turns; of P6. tables[2]: first of P4, P3, P2, P1. tables[3]: first of I2, of I1's colours;
+// the last polar angle, a float by its bits.
 
 struct Between {
     low: u32,
@@ -42,7 +43,7 @@ fn shares(between: Between) -> array<f32, 2> {
 fn place(light: vec3<f32>, view: vec3<f32>) -> Place {
     let grid = coat.tables[0];
     let radius = length(view.xy);
-    let theta = arctangent(radius, max(view.z, 0.0)) * f32(grid.z - 1u) / (0.5 * PI);
+    let theta = arctangent(radius, max(view.z, 0.0)) * f32(grid.z - 1u) / bitcast<f32>(coat.tables[3].z);
     let phi = wrapped(arctangent(view.y, view.x) * f32(grid.w) / (2.0 * PI), grid.w);
     var found: Place;
     found.theta = held(theta, grid.z);

@@ -24,6 +24,8 @@ mod budget;
 pub mod car2d;
 pub mod car3d;
 pub mod container;
+#[cfg(test)]
+mod fixtures;
 mod frame;
 pub mod gaussian_mixture;
 pub mod gmrf;
