@@ -1,11 +1,12 @@
 //! Playback: a textured mesh and a camera in, an RGBA picture out.
 //!
 //! An appearance depends on the eye alone once per frame (`texture::Model::atlas`); what is left is
-//! to draw a mesh with one texture. Two renderers do that by one definition:
+//! to draw a mesh with one texture. Three renderers do that by one definition:
 //!
 //! - [`reference`](mod@reference) casts a ray per sub-sample and is the arbiter;
 //! - [`cpu`] rasterises the same sub-samples in tiles and is what one plays with, models straight from
-//!   their 8-bit layers ([`blend`]).
+//!   their 8-bit layers ([`blend`]);
+//! - `gpu` has graphics hardware do it (feature `gpu`).
 //!
 //! The definition. A pixel has `n × n` sub-samples at the centres of a regular grid. Each sees the
 //! nearest surface (either side of a face, any depth above zero), looks up the texture with
@@ -26,6 +27,8 @@ mod error;
 mod face;
 pub mod film;
 pub mod filter;
+#[cfg(feature = "gpu")]
+pub mod gpu;
 pub mod material;
 pub mod path;
 mod pose;

@@ -49,8 +49,10 @@ fn build() -> PathBuf {
     let profile = here.ancestors().nth(2).unwrap_or_else(|| panic!("{} is in no target folder", here.display()));
     let mut cargo = Command::new(env!("CARGO"));
     cargo.args(["build", "--quiet", "--package", "turnlight", "--bin", "turnlight"]);
-    if cfg!(feature = "video") {
-        cargo.args(["--features", "video"]);
+    for (feature, is_on) in [("gpu", cfg!(feature = "gpu")), ("video", cfg!(feature = "video"))] {
+        if is_on {
+            cargo.args(["--features", feature]);
+        }
     }
     if profile.ends_with("release") {
         cargo.arg("--release");

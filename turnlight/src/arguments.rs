@@ -644,8 +644,22 @@ pub(crate) struct RenderArgs {
     /// Reduce the frames by this whole factor
     #[arg(long, value_name = "N", default_value = "1", value_parser = whole_factor)]
     pub(crate) downscale: usize,
+    /// Who draws; the picture is the same
+    #[arg(long, value_enum, default_value = "auto")]
+    pub(crate) renderer: RendererArg,
     #[command(flatten)]
     pub(crate) light: LightArgs,
+}
+
+/// Who draws.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(crate) enum RendererArg {
+    /// Graphics hardware where this build and this machine have it
+    Auto,
+    /// The CPU
+    Cpu,
+    /// Graphics hardware, or a program that stands in for it; the CPU where there is neither
+    Gpu,
 }
 
 #[derive(Debug, Args)]

@@ -13,6 +13,7 @@
 //! - [`inspect`]: what a mesh, a model or a capture holds;
 //! - [`output`]: files and folders that appear whole or not at all;
 //! - [`panorama`]: light from all around;
+//! - [`projector`]: who draws a model's frames, graphics hardware or the CPU;
 //! - [`scene`]: several models in one scene, as a file;
 //! - [`serve`]: a model and its player on loopback;
 //! - [`shading`]: how the object is lit over a turn;
@@ -34,6 +35,7 @@ pub mod output;
 pub mod panorama;
 pub mod pipeline;
 pub mod playback;
+pub mod projector;
 pub mod scene;
 mod selection;
 pub mod serve;

@@ -50,6 +50,9 @@ fn demo(args: &[String]) -> Result<()> {
 fn test(args: &[String]) -> Result<()> {
     packages::ensure(&[packages::COMPILER])?;
     let root = root()?;
+    if let Err(fault) = packages::ensure(&[packages::VULKAN]) {
+        eprintln!("xtask: a Vulkan driver is not to be had ({fault:#}); where there is no other, its tests skip");
+    }
     let (with_blender, args) = match args.split_first() {
         Some((first, rest)) if first == BLENDER => (true, rest),
         _ => (false, args),
@@ -69,10 +72,10 @@ fn lint(args: &[String]) -> Result<()> {
 /// What to build besides the default.
 fn features() -> &'static [&'static str] {
     match packages::ensure(&[packages::OPENCV, packages::CLANG]) {
-        Ok(()) => &["--features", "tests/video"],
+        Ok(()) => &["--features", "tests/gpu,tests/video"],
         Err(fault) => {
             eprintln!("xtask: OpenCV is not to be had ({fault:#}); films are neither built nor tested");
-            &[]
+            &["--features", "tests/gpu"]
         }
     }
 }

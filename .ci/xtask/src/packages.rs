@@ -23,6 +23,9 @@ pub(crate) const CLANG: Package = Package { probe: &["clang", "--version"], name
 pub(crate) const NODE: Package = Package { probe: &["npm", "--version"], names: &["nodejs", "npm"] };
 /// Plays exported models.
 pub(crate) const CHROMIUM: Package = Package { probe: &["chromium", "--version"], names: &["chromium"] };
+/// Stands in for graphics hardware.
+pub(crate) const VULKAN: Package =
+    Package { probe: &["sh", "-c", "ls /usr/share/vulkan/icd.d/lvp_icd*"], names: &["mesa-vulkan-drivers"] };
 /// Runs the referee, and what we hand to Blender.
 pub(crate) const PYTHON: Package =
     Package { probe: &["python3", "-c", "import ensurepip, venv"], names: &["python3", "python3-venv"] };

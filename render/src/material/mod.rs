@@ -24,6 +24,8 @@
 pub mod environment;
 pub mod frame;
 mod light;
+#[cfg(feature = "gpu")]
+pub(crate) mod numbers;
 mod tile;
 
 pub use light::{Light, Lighting};

@@ -42,10 +42,12 @@ mod random_field;
 mod rows;
 mod score;
 pub mod statistics;
+mod tables;
 
 pub use container::Part;
 pub use frame::{Blend, DirectionSet, Frame};
 pub use score::{Score, score};
+pub use tables::{MixtureComponent, MixtureTables, Tables, VqTables};
 
 use crate::TextureError;
 use capture::btf::{Btf, Encoding};
@@ -73,6 +75,11 @@ pub trait Sampler: Send + Sync {
     /// a faster way where the codec has one.
     fn picture(&self, light: &Vector3<f32>, view: &Vector3<f32>) -> Vec<f32> {
         (0..self.frame().texels()).flat_map(|texel| self.value(texel, light, view)).collect()
+    }
+
+    /// What [`Sampler::value`] computes with; none where the codec keeps it to itself.
+    fn tables(&self) -> Option<Tables> {
+        None
     }
 }
 

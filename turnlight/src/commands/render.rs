@@ -2,14 +2,14 @@
 
 use super::read_capture;
 use crate::Answer;
-use crate::arguments::RenderArgs;
+use crate::arguments::{RenderArgs, RendererArg};
 use serde_json::json;
 use std::time::Instant;
 use turnlight::capture::{Aabb, Camera, Capture, Image};
 use turnlight::output::OutputFolder;
+use turnlight::projector::{Choice, Projector};
 use turnlight::render::RenderOptions;
 use turnlight::render::backdrop::put_behind;
-use turnlight::render::cpu::ScenePlayer;
 use turnlight::render::film::write_png;
 use turnlight::render::path::{smooth_cameras, turntable_cameras, up_axis};
 use turnlight::scene::Scene;
@@ -36,14 +36,15 @@ pub(crate) fn run(args: &RenderArgs, observer: &dyn Observer) -> Result<Answer, 
     let cameras = cameras(args, &scene)?;
     let folder = args.output.as_deref().map(OutputFolder::create).transpose()?;
     let mut times_ms = Vec::with_capacity(cameras.len());
-    stages.run("render", |observer| draw(&scene, &cameras, args, folder.as_ref(), &mut times_ms, observer))?;
+    let device =
+        stages.run("render", |observer| draw(&scene, &cameras, args, folder.as_ref(), &mut times_ms, observer))?;
     if let Some(folder) = folder {
         folder.finish()?;
     }
-    Ok(answer(args, &cameras, &times_ms, &stages))
+    Ok(answer(args, &cameras, (&times_ms, &device), &stages))
 }
 
-fn answer(args: &RenderArgs, cameras: &[Numbered], times_ms: &[f64], stages: &Stages<'_>) -> Answer {
+fn answer(args: &RenderArgs, cameras: &[Numbered], (times_ms, device): (&[f64], &str), stages: &Stages<'_>) -> Answer {
     let size = cameras.first().map_or([0, 0], |(_, c)| [c.intrinsics.width, c.intrinsics.height]);
     let mut sorted = times_ms.to_vec();
     sorted.sort_by(f64::total_cmp);
@@ -57,7 +58,7 @@ fn answer(args: &RenderArgs, cameras: &[Numbered], times_ms: &[f64], stages: &St
         "width": size[0],
         "height": size[1],
         "frame_ms": frame_ms,
-        "frame_device": format!("cpu, {} threads", rayon::current_num_threads()),
+        "frame_device": device,
         "output": args.output,
         "video": args.video,
         "stages": stages.finished(),
@@ -123,7 +124,15 @@ fn orbit(args: &RenderArgs, scene: &Scene, capture: Option<&Capture>, n: usize) 
     turntable_cameras(&aabb, like, n, size[0], size[1], up)
 }
 
-/// Draws every frame once, to the folder and to the film.
+fn choice(renderer: RendererArg) -> Choice {
+    match renderer {
+        RendererArg::Auto => Choice::Auto,
+        RendererArg::Cpu => Choice::Cpu,
+        RendererArg::Gpu => Choice::Gpu,
+    }
+}
+
+/// Draws every frame once, to the folder and to the film; says what drew them.
 fn draw(
     scene: &Scene,
     cameras: &[Numbered],
@@ -131,19 +140,20 @@ fn draw(
     folder: Option<&OutputFolder>,
     times_ms: &mut Vec<f64>,
     observer: &dyn Observer,
-) -> Result<(), Error> {
+) -> Result<String, Error> {
     let tiles: Vec<_> = scene.models.iter().map(playback::tiles).collect();
     let coats: Vec<_> = scene.models.iter().zip(&tiles).map(|(model, tiles)| playback::coats(model, tiles)).collect();
     let options = RenderOptions { supersample: args.supersample, background: args.background };
-    let mut player = ScenePlayer::new(&playback::objects(scene, &coats), options);
+    let mut projector = Projector::new(scene, &coats, options, choice(args.renderer))?;
     let lamps = args.light.lamps(scene.aabb().map_or([0.0; 3], |aabb| aabb.center().into()))?;
     let mut frame = |i: usize, camera: &Camera| {
         let start = Instant::now();
-        let mut frame = player.render(camera, &lamps.seen_by(camera));
+        let mut frame = projector.frame(camera, &lamps.seen_by(camera));
         if let Some(backdrop) = &scene.backdrop {
             put_behind(&mut frame, backdrop, camera);
         }
         times_ms.push(start.elapsed().as_secs_f64() * 1e3);
+        projector.take_note().iter().for_each(|note| observer.noted(note));
         observer.advanced(i + 1, cameras.len());
         frame
     };
@@ -163,5 +173,5 @@ fn draw(
         Some(video) => film::write_film(video, frames, args.fps)?,
         None => frames.for_each(drop),
     }
-    fault.map_or(Ok(()), Err)
+    fault.map_or(Ok(projector.device().to_owned()), Err)
 }

@@ -46,7 +46,7 @@ mod variables;
 
 pub use storage::{Counting, printed_bytes, ratio_as_printed};
 
-use super::{Budget, FitReport, Frame, Precision, Sampler};
+use super::{Budget, FitReport, Frame, MixtureTables, Precision, Sampler, Tables};
 use crate::TextureError;
 use capture::btf::Btf;
 use estimation::{Estimate, estimate};
@@ -266,5 +266,11 @@ impl Sampler for GaussianMixture {
         let mut picture = prediction::picture(&self.packed, &x, &y, angles(light, view));
         picture.chunks_exact_mut(3).for_each(|texel| (0..3).for_each(|c| texel[c] += mean[c]));
         picture
+    }
+
+    fn tables(&self) -> Option<Tables> {
+        let components = (0..self.packed.count).map(|m| self.packed.component(m)).collect();
+        let mean = self.mean.as_chunks::<3>().0.iter().map(|m| m.map(|c| f32::from(c) / 255.0)).collect();
+        Some(Tables::GaussianMixture(MixtureTables { components, mean }))
     }
 }

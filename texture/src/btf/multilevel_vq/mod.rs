@@ -478,6 +478,10 @@ impl Sampler for MultilevelVq {
         let place = self.tables.place(&self.books, light, view);
         (0..self.frame.texels()).flat_map(|t| self.tables.value(&self.books, self.plane(), t, &place)).collect()
     }
+
+    fn tables(&self) -> Option<super::Tables> {
+        Some(super::Tables::MultilevelVq(self.tables.exported(&self.books, self.plane())))
+    }
 }
 
 impl Stored for MultilevelVq {
