@@ -17,14 +17,14 @@ pub(crate) struct Corners {
 
 /// The corners of `face`; `None` where an index leads nowhere or a number is not finite.
 pub(crate) fn corners(mesh: &TexturedMesh, face: usize) -> Option<Corners> {
-    let [a, b, c] = (*mesh.mesh.faces.get(face)?).map(|v| v as usize);
-    let position = |v: usize| {
-        let p = mesh.mesh.positions.get(v)?;
-        p.iter().all(|x| x.abs() <= MAX_COORDINATE).then_some(*p)
-    };
-    let uv = |v: usize| {
-        let uv = mesh.uvs.get(v)?;
-        uv.iter().all(|x| x.abs() <= MAX_COORDINATE).then_some(*uv)
-    };
-    Some(Corners { positions: [position(a)?, position(b)?, position(c)?], uvs: [uv(a)?, uv(b)?, uv(c)?] })
+    let [a, b, c] = (*mesh.mesh.faces.get(face)?).map(|v| vertex(mesh, v as usize));
+    let [(a, s), (b, t), (c, u)] = [a?, b?, c?];
+    Some(Corners { positions: [a, b, c], uvs: [s, t, u] })
+}
+
+/// Where a vertex lies, and its texture coordinates; `None` where a number is missing or not finite.
+pub(crate) fn vertex(mesh: &TexturedMesh, vertex: usize) -> Option<(Point3<f64>, Point2<f64>)> {
+    let (position, uv) = (mesh.mesh.positions.get(vertex)?, mesh.uvs.get(vertex)?);
+    let is_sound = position.iter().chain(uv.iter()).all(|x| x.abs() <= MAX_COORDINATE);
+    is_sound.then_some((*position, *uv))
 }

@@ -9,6 +9,7 @@
 
 use capture::Image;
 use rayon::prelude::*;
+use std::borrow::Cow;
 
 /// Mip levels below this count as level 0. A 1:1 view then reads level 0 alone despite rounding;
 /// graphics hardware quantises levels to the same 1/256.
@@ -25,28 +26,194 @@ const HALVINGS: [f32; 64] = {
     scales
 };
 
-/// An atlas and as many reductions of it as were asked for.
-#[derive(Clone, Debug)]
-pub struct MipChain<'a> {
-    base: &'a Image<[f32; 3]>,
-    reduced: Vec<Image<[f32; 3]>>,
+/// Eight numbers in a register: two texels side by side, and two numbers of the next.
+pub trait Eight: Copy {
+    /// From memory.
+    fn load(from: &[i16; 8]) -> Self;
+
+    /// `self` at `t = 0`, `to` at `t = 2^15`: `self + (to − self) t / 2^15`, rounded half up. Wraps where a difference
+    /// leaves 16 bits.
+    fn toward(self, to: Self, t: i16) -> Self;
+
+    /// The second texel in the place of the first.
+    fn second(self) -> Self;
+
+    /// The first texel, and a number more.
+    fn first(self) -> [i16; 4];
 }
 
-impl<'a> MipChain<'a> {
+impl Eight for [i16; 8] {
+    #[inline(always)]
+    fn load(from: &[i16; 8]) -> Self {
+        *from
+    }
+
+    #[inline(always)]
+    fn toward(self, to: Self, t: i16) -> Self {
+        let mut out = self;
+        for k in 0..8 {
+            let product = i32::from(to[k].wrapping_sub(self[k])) * i32::from(t);
+            out[k] = out[k].wrapping_add((((product >> 14) + 1) >> 1) as i16);
+        }
+        out
+    }
+
+    #[inline(always)]
+    fn second(self) -> Self {
+        let [.., d, e, f, g, h] = self;
+        [d, e, f, g, h, 0, 0, 0]
+    }
+
+    #[inline(always)]
+    fn first(self) -> [i16; 4] {
+        let [a, b, c, d, ..] = self;
+        [a, b, c, d]
+    }
+}
+
+/// A channel of a texel: `f32` in levels of 0..=255, or `i16` in shares of one ([`FIXED_ONE`]).
+pub trait Channel: Copy + Default + Send + Sync + std::fmt::Debug + 'static {
+    /// Levels of 0..=255 per unit.
+    const LEVELS: f32;
+
+    /// As it is, in its own units.
+    fn widened(self) -> f32;
+
+    /// Rounds to the nearest of 0..=255; NaN becomes 0.
+    fn rounded(self) -> u8;
+
+    /// The mean of four; whole numbers round half up.
+    fn mean(four: [Self; 4]) -> Self;
+
+    /// Two texels of two rows each, mixed: `s` across, `t` down. Of two such, `fine` and `coarse`, at `level` between
+    /// them. The fourth number is none.
+    fn mix<E: Eight>(fine: &Taps<'_, Self>, coarse: Option<(&Taps<'_, Self>, f32)>) -> [Self; 4];
+}
+
+/// What a lookup on one level reads: of two rows two texels side by side and two numbers of the next, and how far the place
+/// is on the way from the first to the second.
+#[derive(Clone, Copy, Debug)]
+pub struct Taps<'a, T> {
+    rows: [&'a [T; 8]; 2],
+    across: f32,
+    down: f32,
+}
+
+/// Binary places of a texel in fixed point, which so reaches from −1024 to 1023.97 levels of 0..=255.
+pub const FIXED_PLACES: u32 = 5;
+
+/// One level of 0..=255 in a texel of fixed point.
+pub const FIXED_ONE: f32 = (1 << FIXED_PLACES) as f32;
+
+impl Channel for f32 {
+    const LEVELS: Self = 1.0;
+
+    #[inline(always)]
+    fn widened(self) -> f32 {
+        self
+    }
+
+    #[inline(always)]
+    fn rounded(self) -> u8 {
+        // A cast saturates, and truncates what is positive.
+        (self + 0.5) as u8
+    }
+
+    #[inline(always)]
+    fn mean([a, b, c, d]: [Self; 4]) -> Self {
+        0.25 * (a + b + c + d)
+    }
+
+    #[inline(always)]
+    fn mix<E: Eight>(fine: &Taps<'_, Self>, coarse: Option<(&Taps<'_, Self>, f32)>) -> [Self; 4] {
+        let bilinear = |taps: &Taps<'_, Self>| {
+            // Plain loops: `map` over an array is not always inlined.
+            let (mut columns, mut out) = (*taps.rows[0], [0.0; 4]);
+            for k in 0..8 {
+                columns[k] += taps.down * (taps.rows[1][k] - columns[k]);
+            }
+            for k in 0..3 {
+                out[k] = columns[k] + taps.across * (columns[k + 3] - columns[k]);
+            }
+            out
+        };
+        let mut out = bilinear(fine);
+        if let Some((taps, share)) = coarse {
+            let coarse = bilinear(taps);
+            for k in 0..4 {
+                out[k] += share * (coarse[k] - out[k]);
+            }
+        }
+        out
+    }
+}
+
+/// Whole numbers all the way, the same on every machine; each of three steps rounds by 1/64 level at most.
+impl Channel for i16 {
+    const LEVELS: f32 = 1.0 / FIXED_ONE;
+
+    #[inline(always)]
+    fn widened(self) -> f32 {
+        f32::from(self)
+    }
+
+    #[inline(always)]
+    fn rounded(self) -> u8 {
+        ((i32::from(self) + (1 << FIXED_PLACES >> 1)) >> FIXED_PLACES).clamp(0, 255) as u8
+    }
+
+    #[inline(always)]
+    fn mean(four: [Self; 4]) -> Self {
+        let [a, b, c, d] = four.map(i32::from);
+        ((a + b + c + d + 2) >> 2) as Self
+    }
+
+    #[inline(always)]
+    fn mix<E: Eight>(fine: &Taps<'_, Self>, coarse: Option<(&Taps<'_, Self>, f32)>) -> [Self; 4] {
+        // Through 32 bits, which saturates where it cannot matter.
+        let share = |t: f32| (t * f32::from(Self::MAX)) as i32 as Self;
+        let bilinear = |taps: &Taps<'_, Self>| {
+            let [above, below] = taps.rows.map(E::load);
+            let columns = above.toward(below, share(taps.down));
+            columns.toward(columns.second(), share(taps.across))
+        };
+        match coarse {
+            None => bilinear(fine).first(),
+            Some((taps, t)) => bilinear(fine).toward(bilinear(taps), share(t)).first(),
+        }
+    }
+}
+
+/// `log2(1 + m) = m (1 + (1 − m) P(m))`: coefficients of P.
+const LOG2: [f32; 4] = [0.441_917_04, -0.267_179_4, 0.148_426_6, -0.045_149_03];
+
+/// An atlas and as many reductions of it as were asked for.
+#[derive(Clone, Debug)]
+pub struct MipChain<'a, T: Channel = f32> {
+    base: &'a Image<[T; 3]>,
+    reduced: Cow<'a, [Image<[T; 3]>]>,
+}
+
+impl<'a, T: Channel> MipChain<'a, T> {
     /// The atlas with levels 1 ..= `top`, or up to the level of one texel where that is lower.
-    pub fn build(base: &'a Image<[f32; 3]>, top: usize) -> Self {
+    pub fn build(base: &'a Image<[T; 3]>, top: usize) -> Self {
         let top = top.min(top_level(base.width(), base.height()));
-        let mut reduced: Vec<Image<[f32; 3]>> = Vec::with_capacity(top);
+        let mut reduced: Vec<Image<[T; 3]>> = Vec::with_capacity(top);
         for _ in 0..top {
             let next = halved(reduced.last().unwrap_or(base));
             reduced.push(next);
         }
-        Self { base, reduced }
+        Self { base, reduced: reduced.into() }
+    }
+
+    /// Levels made elsewhere: level 0, and those from 1 on.
+    pub(crate) fn of(base: &'a Image<[T; 3]>, reduced: &'a [Image<[T; 3]>]) -> Self {
+        Self { base, reduced: reduced.into() }
     }
 
     /// The texels of `level`, 0 being the atlas; the coarsest built where `level` lies beyond.
     #[inline]
-    pub fn level(&self, level: usize) -> &Image<[f32; 3]> {
+    pub fn level(&self, level: usize) -> &Image<[T; 3]> {
         match level.min(self.reduced.len()) {
             0 => self.base,
             l => &self.reduced[l - 1],
@@ -54,19 +221,59 @@ impl<'a> MipChain<'a> {
     }
 
     /// The texture at (`x`, `y`) in texels of level 0, outer corner of the first texel (0, 0),
-    /// filtered trilinearly for a fractional `level`. Zero of an empty atlas.
-    #[inline]
+    /// filtered trilinearly for a fractional `level`; in levels of 0..=255. Zero of an empty atlas.
     pub fn sample(&self, x: f32, y: f32, level: f32) -> [f32; 3] {
-        let level = level.min(self.reduced.len() as f32);
+        let [r, g, b, _] = self.look_up::<[i16; 8]>(x, y, level);
+        [r, g, b].map(|v| v.widened() * T::LEVELS)
+    }
+
+    /// The same in the texels' units. The fourth number is none.
+    #[inline(always)]
+    pub(crate) fn look_up<E: Eight>(&self, x: f32, y: f32, level: f32) -> [T; 4] {
+        let level = level.min(self.reduced.len() as i32 as f32);
         // Also the way out for NaN.
         if level.is_nan() || level < MIN_LEVEL {
-            return bilinear(self.base, x, y);
+            let place = Place::new(self.base, x, y);
+            return match place.taps(self.base) {
+                Some(taps) => T::mix::<E>(&taps, None),
+                None => mix_bordering::<T, E>([self.base; 2], [place; 2], 0.0),
+            };
         }
-        let fine = level as usize;
+        let fine = level as i32 as usize;
         let scale = HALVINGS[fine.min(HALVINGS.len() - 1)];
-        let a = bilinear(self.level(fine), x * scale, y * scale);
-        let b = bilinear(self.level(fine + 1), x * scale * 0.5, y * scale * 0.5);
-        mixed(a, b, level - fine as f32)
+        let images = [self.level(fine), self.level(fine + 1)];
+        let places =
+            [Place::new(images[0], x * scale, y * scale), Place::new(images[1], x * scale * 0.5, y * scale * 0.5)];
+        let share = level - fine as i32 as f32;
+        match (places[0].taps(images[0]), places[1].taps(images[1])) {
+            (Some(a), Some(b)) => T::mix::<E>(&a, Some((&b, share))),
+            _ => mix_bordering::<T, E>(images, places, share),
+        }
+    }
+}
+
+impl<T: Channel> MipChain<'_, T> {
+    /// [`MipChain::look_up`] of up to N places side by side, as many as `out` holds.
+    #[inline(always)]
+    pub(crate) fn look_up_all<E: Eight, const N: usize>(&self, [xs, ys, levels]: [&[f32; N]; 3], out: &mut [[T; 4]]) {
+        let count = out.len().min(N);
+        if levels[..count].iter().any(|&level| level >= MIN_LEVEL) {
+            for (k, out) in out.iter_mut().enumerate().take(count) {
+                *out = self.look_up::<E>(xs[k], ys[k], levels[k]);
+            }
+            return;
+        }
+        // On the one level that nearby objects show, places are found in vectors.
+        let columns: Axis<N> = Axis::new(&xs[..count], self.base.width());
+        let rows: Axis<N> = Axis::new(&ys[..count], self.base.height());
+        for (k, out) in out.iter_mut().enumerate().take(count) {
+            let (column, row) = (columns.firsts[k] as usize, rows.firsts[k] as usize);
+            let place = Place { column, row, across: columns.shares[k], down: rows.shares[k] };
+            *out = match place.taps(self.base) {
+                Some(taps) => T::mix::<E>(&taps, None),
+                None => mix_bordering::<T, E>([self.base; 2], [place; 2], 0.0),
+            };
+        }
     }
 }
 
@@ -84,75 +291,127 @@ pub fn level_of_footprint(footprint_squared: f32) -> f32 {
     if footprint_squared > 1.0 { 0.5 * footprint_squared.log2() } else { 0.0 }
 }
 
+/// [`level_of_footprint`] to 1e-5 of a level, in a form that compilers vectorise: the exponent of the float, and a
+/// polynomial of its mantissa, the minimax one for log2 on 1..=2 among those that are exact at both ends.
+#[inline(always)]
+pub(crate) fn quick_level_of_footprint(footprint_squared: f32) -> f32 {
+    let bits = footprint_squared.to_bits();
+    let exponent = (bits >> 23) as i32 - 127;
+    let m = f32::from_bits((bits & 0x007f_ffff) | 0x3f80_0000) - 1.0;
+    let log2 = m * (1.0 + (1.0 - m) * (LOG2[0] + m * (LOG2[1] + m * (LOG2[2] + m * LOG2[3]))));
+    // A comparison that NaN fails.
+    if footprint_squared > 1.0 { 0.5 * (exponent as f32 + log2) } else { 0.0 }
+}
+
 /// Half the size, each texel the mean of 2 × 2.
-fn halved(fine: &Image<[f32; 3]>) -> Image<[f32; 3]> {
+fn halved<T: Channel>(fine: &Image<[T; 3]>) -> Image<[T; 3]> {
     let (width, height) = (fine.width().div_ceil(2), fine.height().div_ceil(2));
-    let mut coarse = Image::filled(width, height, [0.0; 3]);
+    let mut coarse = Image::filled(width, height, [T::default(); 3]);
     // An image without texels has no chunks.
     let width = width.max(1);
     coarse.pixels_mut().par_chunks_mut(width).with_min_len(16).enumerate().for_each(|(y, row)| {
-        let above = fine.row(2 * y);
-        let below = fine.row((2 * y + 1).min(fine.height() - 1));
-        for ((texel, a), b) in row.iter_mut().zip(above.chunks(2)).zip(below.chunks(2)) {
-            let ([a0, .., a1] | [a0 @ a1]) = a else { continue };
-            let ([b0, .., b1] | [b0 @ b1]) = b else { continue };
-            for c in 0..3 {
-                texel[c] = 0.25 * (a0[c] + a1[c] + b0[c] + b1[c]);
-            }
-        }
+        halve_row(fine.row(2 * y), fine.row((2 * y + 1).min(fine.height() - 1)), row);
     });
     coarse
 }
 
-/// One level at (`x`, `y`) in its own texels, borders repeated.
-#[inline]
-fn bilinear(image: &Image<[f32; 3]>, x: f32, y: f32) -> [f32; 3] {
-    let (width, texels) = (image.width(), image.pixels().as_flattened());
-    let (column, s) = before(x, width);
-    let (row, t) = before(y, image.height());
-    let above = 3 * (row * width + column);
-    let below = if image.height() > 1 { above + 3 * width } else { above };
-    // Two texels side by side are six numbers in a row: one check and two loads for both.
-    let pair = |start: usize| texels.get(start..start + 6).and_then(|pair| pair.first_chunk::<6>());
-    let (Some(above), Some(below), true) = (pair(above), pair(below), width > 1) else {
-        return narrow(image, row, t);
-    };
-    // Plain loops: `map` over an array is not always inlined.
-    let mut columns = *above;
-    for k in 0..6 {
-        columns[k] += t * (below[k] - above[k]);
+/// Half of two rows; an odd last texel is repeated.
+#[inline(always)]
+pub(crate) fn halve_row<T: Channel>(above: &[[T; 3]], below: &[[T; 3]], out: &mut [[T; 3]]) {
+    for ((texel, a), b) in out.iter_mut().zip(above.chunks(2)).zip(below.chunks(2)) {
+        let ([a0, .., a1] | [a0 @ a1]) = a else { continue };
+        let ([b0, .., b1] | [b0 @ b1]) = b else { continue };
+        for c in 0..3 {
+            texel[c] = T::mean([a0[c], a1[c], b0[c], b1[c]]);
+        }
     }
-    let mut out = [0.0; 3];
-    for k in 0..3 {
-        out[k] = columns[k] + s * (columns[k + 3] - columns[k]);
-    }
-    out
 }
 
-/// Between `row` and the next in an image one texel wide; zero of an empty one.
+/// Places on one axis of a level, side by side.
+struct Axis<const N: usize> {
+    firsts: [i32; N],
+    shares: [f32; N],
+}
+
+impl<const N: usize> Axis<N> {
+    #[inline(always)]
+    fn new(at: &[f32], size: usize) -> Self {
+        let mut axis = Self { firsts: [0; N], shares: [0.0; N] };
+        for ((&at, first), share) in at.iter().zip(&mut axis.firsts).zip(&mut axis.shares) {
+            (*first, *share) = before(at, size);
+        }
+        axis
+    }
+}
+
+/// A place on one level: the texel whose centre lies before it, and how far it is on the way to the next.
+#[derive(Clone, Copy, Debug)]
+struct Place {
+    column: usize,
+    row: usize,
+    across: f32,
+    down: f32,
+}
+
+impl Place {
+    /// (`x`, `y`) in the level's own texels; borders are repeated.
+    #[inline(always)]
+    fn new<T>(image: &Image<[T; 3]>, x: f32, y: f32) -> Self
+    where
+        T: Channel,
+    {
+        let (column, across) = before(x, image.width());
+        let (row, down) = before(y, image.height());
+        Self { column: column as usize, row: row as usize, across, down }
+    }
+
+    /// `None` where there are no two texels and two numbers more in both rows: at the end of an image, in one that is one
+    /// texel wide, in one without texels.
+    #[inline(always)]
+    fn taps<'a, T: Channel>(&self, image: &'a Image<[T; 3]>) -> Option<Taps<'a, T>> {
+        let (width, texels) = (image.width(), image.pixels().as_flattened());
+        let above = 3 * (self.row * width + self.column);
+        let below = if image.height() > 1 { above + 3 * width } else { above };
+        // Two texels side by side are six numbers in a row, eight fill a register: one check and one load for both.
+        let lanes = |start: usize| texels.get(start..start + 8).and_then(|lanes| lanes.first_chunk::<8>());
+        let rows = [lanes(above)?, lanes(below)?];
+        (width > 1).then_some(Taps { rows, across: self.across, down: self.down })
+    }
+
+    /// The same texel by texel.
+    fn gathered<T: Channel>(&self, image: &Image<[T; 3]>) -> [[T; 8]; 2] {
+        let row = |y: usize| {
+            let mut lanes = [T::default(); 8];
+            for (k, x) in [self.column, self.column + 1].into_iter().enumerate() {
+                let (x, y) = (x.min(image.width().saturating_sub(1)), y.min(image.height().saturating_sub(1)));
+                let texel = image.pixels().get(y * image.width() + x).copied().unwrap_or_default();
+                lanes[3 * k..3 * k + 3].copy_from_slice(&texel);
+            }
+            lanes
+        };
+        [row(self.row), row(self.row + 1)]
+    }
+}
+
+/// A lookup that touches the end of an image.
 #[cold]
-fn narrow(image: &Image<[f32; 3]>, row: usize, t: f32) -> [f32; 3] {
-    let Some(a) = image.pixels().get(row) else { return [0.0; 3] };
-    mixed(*a, *image.pixels().get(row + 1).unwrap_or(a), t)
-}
-
-/// `a` at `t = 0`, `b` at `t = 1`.
-#[inline]
-fn mixed(a: [f32; 3], b: [f32; 3], t: f32) -> [f32; 3] {
-    let mut out = a;
-    for k in 0..3 {
-        out[k] += t * (b[k] - a[k]);
-    }
-    out
+fn mix_bordering<T: Channel, E: Eight>(images: [&Image<[T; 3]>; 2], places: [Place; 2], share: f32) -> [T; 4] {
+    let rows = [places[0].gathered(images[0]), places[1].gathered(images[1])];
+    let taps = |k: usize| {
+        let [above, below] = &rows[k];
+        Taps { rows: [above, below], across: places[k].across, down: places[k].down }
+    };
+    T::mix::<E>(&taps(0), Some((&taps(1), share)))
 }
 
 /// The texel whose centre lies before `x` and how far `x` is on the way to the next. The last texel is
 /// reached as the next of the one before it.
 #[inline]
-fn before(x: f32, size: usize) -> (usize, f32) {
-    let x = (x - 0.5).max(0.0).min(size.saturating_sub(1) as f32);
-    // Through i32: the conversion to 64 bit is slow.
-    let first = (x as i32 as usize).min(size.saturating_sub(2));
+fn before(x: f32, size: usize) -> (i32, f32) {
+    // In 32 bits, which no image's side leaves: conversions from and to 64 are slow.
+    let last = size as i32 - 1;
+    let x = (x - 0.5).max(0.0).min(last.max(0) as f32);
+    let first = (x as i32).min((last - 1).max(0));
     (first, x - first as f32)
 }
 
@@ -211,8 +470,34 @@ mod tests {
     }
 
     #[test]
+    fn quick_levels_are_levels() {
+        for i in 0..20_000 {
+            let footprint = 1.0005f32.powi(i) * 0.9;
+            let (quick, exact) = (quick_level_of_footprint(footprint), level_of_footprint(footprint));
+            assert!((quick - exact).abs() < 2e-5, "{quick} for {exact}");
+        }
+        for nothing in [f32::NAN, f32::NEG_INFINITY, -3.0, 0.0, 1.0] {
+            assert_eq!(quick_level_of_footprint(nothing), 0.0);
+        }
+    }
+
+    #[test]
+    fn fixed_point_is_as_near_as_it_says() {
+        let exact = pattern(37, 22, 0.0);
+        let fixed = exact.map(|p| p.map(|v| (v * FIXED_ONE).round() as i16));
+        let (a, b) = (MipChain::build(&exact, usize::MAX), MipChain::build(&fixed, usize::MAX));
+        for i in 0..400 {
+            let (x, y, level) = (i as f32 * 0.093, i as f32 * 0.055, i as f32 * 0.014);
+            let (p, q) = (a.sample(x, y, level), b.sample(x, y, level));
+            // Half a unit for the texels, for each reduction, and for each of three mixes.
+            let bound = 0.5 * (4.0 + level.ceil()) / FIXED_ONE + 1e-4;
+            assert!((0..3).all(|c| (p[c] - q[c]).abs() < bound), "{p:?} {q:?} at level {level}");
+        }
+    }
+
+    #[test]
     fn nothing_panics_without_texels() {
-        let empty = Image::filled(0, 0, [0.0; 3]);
+        let empty: Image<[f32; 3]> = Image::filled(0, 0, [0.0; 3]);
         assert_eq!(MipChain::build(&empty, 4).sample(0.0, f32::NAN, 3.0), [0.0; 3]);
         let chain = Image::filled(1, 1, [1.0; 3]);
         assert_eq!(MipChain::build(&chain, 4).sample(f32::NAN, f32::INFINITY, 3.0).len(), 3);

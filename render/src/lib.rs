@@ -1,10 +1,12 @@
 //! Playback: a textured mesh and a camera in, an RGBA picture out.
 //!
 //! An appearance depends on the eye alone once per frame (`texture::Model::atlas`); what is left is
-//! to draw a mesh with one texture. Two renderers do that by one definition:
+//! to draw a mesh with one texture. Three renderers do that by one definition:
 //!
 //! - [`reference`](mod@reference) casts a ray per sub-sample and is the arbiter;
-//! - [`cpu`] rasterises the same sub-samples in tiles and is what one plays with.
+//! - [`cpu`] rasterises the same sub-samples in tiles and is what one plays with, models straight from
+//!   their 8-bit layers ([`blend`]);
+//! - `gpu` has graphics hardware do it (feature `gpu`).
 //!
 //! The definition. A pixel has `n × n` sub-samples at the centres of a regular grid. Each sees the
 //! nearest surface (either side of a face, any depth above zero), looks up the texture with
@@ -17,18 +19,26 @@
 //! mip level; filtering is isotropic, so surfaces at grazing angles blur along the far direction;
 //! frames beyond [`MAX_PIXELS`] come back empty; of two faces at the very same depth either may show.
 
+pub mod backdrop;
+pub mod blend;
+pub mod blender;
 pub mod cpu;
 mod error;
 mod face;
 pub mod film;
 pub mod filter;
+#[cfg(feature = "gpu")]
+pub mod gpu;
 pub mod material;
 pub mod path;
+mod pose;
 pub mod reference;
 mod resolve;
+mod simd;
 pub mod web;
 
 pub use error::RenderError;
+pub use pose::Pose;
 
 use capture::Camera;
 

@@ -1,7 +1,7 @@
-//! Cameras for a turntable film.
+//! Cameras for a film: around a turntable, or smoothly through key poses.
 
 use capture::{Aabb, Camera, Distortion, Intrinsics};
-use nalgebra::{Matrix3, Point3, Rotation3, Unit, Vector3};
+use nalgebra::{Matrix3, Point3, Quaternion, Rotation3, Unit, UnitQuaternion, Vector3};
 use std::f64::consts::TAU;
 
 /// How much of the frame the corners of the object's box span at most, in width and in height. A round
@@ -50,6 +50,55 @@ pub fn turntable_cameras(
             Camera { intrinsics, rotation, translation: -(rotation * eye.coords) }
         })
         .collect()
+}
+
+/// `n` cameras from the first of `keys` through all to the last, in even steps of time from key to key: eyes, orientations
+/// and focal lengths by Catmull–Rom splines (velocity at a key is half the way between its neighbours), orientations as
+/// quaternions on one side of the sphere, made unit. Frames are as large as the first key's, without its lens. None without
+/// keys; keys that see nothing are left out.
+pub fn smooth_cameras(keys: &[Camera], n: usize) -> Vec<Camera> {
+    let keys: Vec<&Camera> = keys.iter().filter(|camera| crate::is_usable(camera)).collect();
+    let Some(first) = keys.first() else { return Vec::new() };
+    let mut turns: Vec<Quaternion<f64>> = Vec::with_capacity(keys.len());
+    for key in &keys {
+        let rotation = Rotation3::from_matrix(&key.rotation);
+        let turn = UnitQuaternion::from_rotation_matrix(&rotation).into_inner();
+        // A quaternion and its negative are one rotation: the one nearer to the last.
+        let is_far = turns.last().is_some_and(|last| last.coords.dot(&turn.coords) < 0.0);
+        turns.push(if is_far { -turn } else { turn });
+    }
+    let numbers = |k: usize| {
+        let (i, eye, turn) = (keys[k].intrinsics, keys[k].center(), turns[k].coords);
+        let scale = first.intrinsics.height as f64 / i.height.max(1) as f64;
+        [eye.x, eye.y, eye.z, turn.x, turn.y, turn.z, turn.w, i.fx * scale, i.fy * scale]
+    };
+    let numbers: Vec<[f64; 9]> = (0..keys.len()).map(numbers).collect();
+    let last = (keys.len() - 1) as f64;
+    let at = |frame: usize| if n > 1 { last * frame as f64 / (n - 1) as f64 } else { 0.0 };
+    (0..n).filter_map(|frame| camera_of(&spline(&numbers, at(frame)), &first.intrinsics)).collect()
+}
+
+/// The spline through `keys` at `t`, which counts keys; at its ends it runs straight on.
+fn spline<const N: usize>(keys: &[[f64; N]], t: f64) -> [f64; N] {
+    let last = keys.len() - 1;
+    let segment = (t as usize).min(last.saturating_sub(1));
+    let s = t - segment as f64;
+    let key = |k: isize| keys[k.clamp(0, last as isize) as usize];
+    let i = segment as isize;
+    let (a, b, c, d) = (key(i - 1), key(i), key(i + 1), key(i + 2));
+    std::array::from_fn(|k| {
+        let (from, to) = (0.5 * (c[k] - a[k]), 0.5 * (d[k] - b[k]));
+        let rise = c[k] - b[k];
+        b[k] + s * (from + s * (3.0 * rise - 2.0 * from - to + s * (from + to - 2.0 * rise)))
+    })
+}
+
+/// `None` where quaternions cancel.
+fn camera_of(&[x, y, z, i, j, k, w, fx, fy]: &[f64; 9], like: &Intrinsics) -> Option<Camera> {
+    let turn = UnitQuaternion::try_new(Quaternion::new(w, i, j, k), 1e-9)?;
+    let rotation = turn.to_rotation_matrix().into_inner();
+    let intrinsics = Intrinsics { fx, fy, distortion: Distortion::default(), ..*like };
+    Some(Camera { intrinsics, rotation, translation: -(rotation * Vector3::new(x, y, z)) })
 }
 
 /// The axis of the turntable that `cameras` were taken on: the normal of the plane through their
@@ -191,6 +240,37 @@ mod tests {
         let direction = |c: &Camera| (c.center() - unit_box().center()).normalize();
         assert!((direction(&again[0]) - direction(&first)).norm() < 1e-12);
         assert!((again[0].intrinsics.fx - 2.0 * first.intrinsics.fx).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_path_passes_its_keys_without_a_jump() {
+        let keys = turntable_cameras(&unit_box(), None, 5, 320, 200, Vector3::z());
+        let path = smooth_cameras(&keys, 4 * 30 + 1);
+        assert_eq!(path.len(), 121);
+        for (k, key) in keys.iter().enumerate() {
+            let found = &path[30 * k];
+            assert!((found.center() - key.center()).norm() < 1e-9 && (found.rotation - key.rotation).norm() < 1e-9);
+        }
+        let steps: Vec<f64> = path.windows(2).map(|w| (w[1].center() - w[0].center()).norm()).collect();
+        let changes = steps.windows(2).map(|w| (w[1] - w[0]).abs()).fold(0.0, f64::max);
+        let mean = steps.iter().sum::<f64>() / steps.len() as f64;
+        // Velocity is continuous: of straight lines from key to key it would jump at each.
+        assert!(changes < 0.15 * mean, "{changes} of {mean}");
+        let turns = path.windows(2).map(|w| (w[1].rotation - w[0].rotation).norm()).fold(0.0, f64::max);
+        assert!(turns < 0.1, "{turns}");
+        let orthonormal = |c: &Camera| (c.rotation * c.rotation.transpose() - Matrix3::identity()).norm() < 1e-9;
+        assert!(path.iter().all(orthonormal));
+    }
+
+    #[test]
+    fn a_path_of_few_keys_stands_or_goes_straight() {
+        let keys = turntable_cameras(&unit_box(), None, 2, 320, 200, Vector3::z());
+        assert!(smooth_cameras(&[], 5).is_empty() && smooth_cameras(&keys, 0).is_empty());
+        let still = smooth_cameras(&keys[..1], 3);
+        assert!(still.len() == 3 && still.iter().all(|c| (c.center() - keys[0].center()).norm() < 1e-9));
+        let mut broken = keys.clone();
+        broken[0].translation.x = f64::NAN;
+        assert!(smooth_cameras(&broken, 3).iter().all(crate::is_usable));
     }
 
     #[test]

@@ -1,9 +1,11 @@
 //! From sub-samples to a pixel: where samples lie, and how they are averaged.
 
+use crate::filter::Channel;
 use capture::Camera;
 use nalgebra::Point2;
 
 /// The pixel coordinates of sub-sample (`column`, `row`), counted over the whole frame.
+#[inline]
 pub(crate) fn sample_position(column: usize, row: usize, per_side: usize) -> Point2<f64> {
     let step = 1.0 / per_side as f64;
     Point2::new((column as f64 + 0.5) * step, (row as f64 + 0.5) * step)
@@ -31,6 +33,12 @@ impl Accumulator {
         self.covered += 1;
     }
 
+    /// Whether no sub-sample is covered.
+    #[inline]
+    pub(crate) fn is_empty(&self) -> bool {
+        self.covered == 0
+    }
+
     /// The pixel out of `samples` sub-samples; the only place where anything is clamped or rounded.
     #[inline]
     pub(crate) fn finish(&self, samples: usize, background: Option<[u8; 3]>) -> [u8; 4] {
@@ -41,7 +49,7 @@ impl Accumulator {
         let scale = 1.0 / samples as f32;
         let mut pixel = [255; 4];
         for c in 0..3 {
-            pixel[c] = to_u8((self.sum[c] + open * f32::from(background[c])) * scale);
+            pixel[c] = ((self.sum[c] + open * f32::from(background[c])) * scale).rounded();
         }
         pixel
     }
@@ -53,12 +61,6 @@ impl Accumulator {
         let scale = 1.0 / self.covered as f32;
         let [r, g, b] = self.sum;
         let alpha = 255.0 * self.covered as f32 / samples as f32;
-        [to_u8(r * scale), to_u8(g * scale), to_u8(b * scale), to_u8(alpha)]
+        [(r * scale).rounded(), (g * scale).rounded(), (b * scale).rounded(), alpha.rounded()]
     }
-}
-
-/// Rounds to the nearest of 0..=255; NaN becomes 0.
-fn to_u8(value: f32) -> u8 {
-    // A cast saturates, and truncates what is positive.
-    (value + 0.5) as u8
 }

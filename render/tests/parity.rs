@@ -1,9 +1,12 @@
 //! The fast renderer draws what the reference defines.
 
+#[path = "support/difference.rs"]
+mod difference;
 mod support;
 
 use capture::btf::{Encoding, bonn_directions};
 use capture::{Camera, Distortion, Image};
+use difference::difference;
 use geometry::TexturedMesh;
 use nalgebra::{Point3, Vector3};
 use render::material::{Coat, Coats, Light, Lighting, Lit};
@@ -11,35 +14,6 @@ use render::{RenderOptions, cpu, reference};
 use std::sync::Arc;
 use support::{atlas, knot, look_at, sphere, surface, torus};
 use texture::btf::{DirectionSet, Frame, Sampler};
-
-/// What two pictures of the same thing may differ by.
-#[derive(Debug, Default)]
-struct Difference {
-    /// Pixels wholly covered in both.
-    inner: usize,
-    /// Of these, further apart than one level.
-    inner_off: usize,
-    /// Pixels partly covered in either.
-    edge: usize,
-    /// Of these, further apart than one level, coverage included.
-    edge_off: usize,
-}
-
-fn difference(a: &Image<[u8; 4]>, b: &Image<[u8; 4]>) -> Difference {
-    assert_eq!((a.width(), a.height()), (b.width(), b.height()));
-    let mut out = Difference::default();
-    for (p, q) in a.pixels().iter().zip(b.pixels()).filter(|(p, q)| p[3] > 0 || q[3] > 0) {
-        let off = usize::from((0..4).any(|c| p[c].abs_diff(q[c]) > 1));
-        if p[3] == 255 && q[3] == 255 {
-            out.inner += 1;
-            out.inner_off += off;
-        } else {
-            out.edge += 1;
-            out.edge_off += off;
-        }
-    }
-    out
-}
 
 /// Parity as we promise it: 99.9 % of inner pixels to rounding; of edge pixels as much, for both
 /// renderers test the same points and only ties may fall differently.

@@ -1,6 +1,8 @@
-//! What the whole-pipeline tests share: the command, captures to break, and where real data lies.
+//! What the whole-pipeline tests share: the command, captures and models to break, and where real data lies.
 
 pub mod cartoon;
+pub mod hostile;
+pub mod played;
 
 use data_synth::{Effort, Scene, SynthOptions, synthesize};
 use std::path::{Path, PathBuf};
@@ -47,8 +49,10 @@ fn build() -> PathBuf {
     let profile = here.ancestors().nth(2).unwrap_or_else(|| panic!("{} is in no target folder", here.display()));
     let mut cargo = Command::new(env!("CARGO"));
     cargo.args(["build", "--quiet", "--package", "turnlight", "--bin", "turnlight"]);
-    if cfg!(feature = "video") {
-        cargo.args(["--features", "video"]);
+    for (feature, is_on) in [("gpu", cfg!(feature = "gpu")), ("video", cfg!(feature = "video"))] {
+        if is_on {
+            cargo.args(["--features", feature]);
+        }
     }
     if profile.ends_with("release") {
         cargo.arg("--release");

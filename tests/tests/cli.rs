@@ -285,6 +285,35 @@ fn json_is_all_there_is_on_standard_output() {
     assert_eq!((quiet.code, quiet.stdout.as_str(), quiet.stderr.as_str()), (Some(0), "", ""));
 }
 
+/// One picture, whoever draws it: where there is no adapter the CPU does, and says so once.
+#[test]
+fn renderers_draw_the_same() {
+    let place = place();
+    assert_eq!(turnlight(place.path(), &["model", "capture", "-o", "m.glb"]).code, Some(0));
+    let draw = |renderer: &str| {
+        let size = ["--turntable", "2", "--size", "96x72"];
+        turnlight(
+            place.path(),
+            &[&["render", "m.glb", "--renderer", renderer, "-o", renderer, "--json"], &size[..]].concat(),
+        )
+    };
+    let gpu = draw("gpu");
+    if !cfg!(feature = "gpu") {
+        assert_eq!(gpu.code, Some(2));
+        return assert!(gpu.stderr.contains("--features gpu"), "{}", gpu.stderr);
+    }
+    let is_adapter = json(&gpu)["frame_device"].as_str().is_some_and(|device| device.starts_with("gpu"));
+    assert_eq!(gpu.stderr.matches("the CPU draws: ").count(), usize::from(!is_adapter), "{}", gpu.stderr);
+    assert!(json(&draw("cpu"))["frame_device"].as_str().is_some_and(|device| device.starts_with("cpu")));
+    assert_eq!(draw("auto").code, Some(0));
+    for frame in ["0000.png", "0001.png"] {
+        let [a, b] = ["cpu", "gpu"].map(|r| capture::read_rgb(&place.path().join(r).join(frame)).expect("a picture"));
+        let pairs: Vec<_> = a.pixels().iter().zip(b.pixels()).filter(|(p, q)| **p != [0; 3] || **q != [0; 3]).collect();
+        let off = pairs.iter().filter(|(p, q)| (0..3).any(|c| p[c].abs_diff(q[c]) > 1)).count();
+        assert!(pairs.len() > 500 && off * 200 <= pairs.len(), "{off} of {}", pairs.len());
+    }
+}
+
 fn is_png(entry: &std::io::Result<fs::DirEntry>) -> bool {
     entry.as_ref().is_ok_and(|e| e.path().extension().is_some_and(|x| x == "png"))
 }

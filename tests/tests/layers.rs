@@ -15,7 +15,8 @@ const ALLOWED: [(&str, &[&str]); 8] = [
 ];
 
 /// Crates from outside that only one of ours may name: `(theirs, ours)`.
-const HELD: [(&str, &str); 3] = [("clap", "turnlight"), ("indicatif", "turnlight"), ("opencv", "capture")];
+const HELD: [(&str, &str); 4] =
+    [("clap", "turnlight"), ("indicatif", "turnlight"), ("opencv", "capture"), ("wgpu", "render")];
 
 /// Names of the dependencies in a manifest, in every table whose name ends in `dependencies`.
 fn dependencies(manifest: &str) -> Vec<String> {

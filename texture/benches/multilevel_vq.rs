@@ -1,7 +1,7 @@
 //! Multi-level vector quantisation: what a ratio costs in error, and how quickly it answers.
 //!
 //! `cargo bench -p texture --bench multilevel_vq -- FOLDER [RATIO | tTHRESHOLD...]`; seconds are the processor's, of all
-//! threads. Environment: `CROP=16`, `GRID=11,11,7,16`, `PAPER`, `SSIM`, `SHARES=1,0.4,0.16,0.064,0.0256`.
+//! threads. Environment: `CROP=16`, `GRID=11,11,6,16,75`, `REFINE=2`, `PAPER`, `SSIM`, `SHARES=1,.9,.8,.65,.5,.4,.3,.3`.
 
 use capture::btf::{Btf, read_folder};
 use nalgebra::Vector3;
@@ -24,7 +24,11 @@ fn main() {
         "ratio", "bytes", "RMSE", "PSNR", "fit CPU s", "evals/s", "samples/s"
     );
     for budget in &arguments[1..] {
-        let mut options = Options::new(&btf, Budget::Auto, Precision::Compact, 0).expect("options");
+        let asked = match budget.strip_prefix('t') {
+            Some(_) => Budget::Standard,
+            None => Budget::Ratio(budget.parse().expect("a ratio")),
+        };
+        let mut options = Options::new(&btf, asked, Precision::Compact, 0).expect("options");
         if std::env::var_os("PAPER").is_some() {
             options.phases = Phase::PAPER;
         }
@@ -33,17 +37,19 @@ fn main() {
         }
         if let Ok(shares) = std::env::var("SHARES") {
             let all: Vec<f64> = shares.split(',').map(|s| s.parse().expect("a share")).collect();
-            options.squared_shares = all.try_into().expect("five shares");
+            options.squared_shares = all.try_into().expect("eight shares");
         }
         if let Ok(sizes) = std::env::var("GRID") {
             let sizes: Vec<usize> = sizes.split(',').map(|s| s.parse().expect("a size")).collect();
-            let [alpha, beta, theta, phi] = sizes.try_into().expect("four sizes");
-            options.grid = Grid { alpha, beta, theta, phi, ..options.grid };
+            let [alpha, beta, theta, phi, rim] = sizes.try_into().expect("five sizes");
+            options.grid = Grid { alpha, beta, theta, phi, rim_deg: rim as u8, ..options.grid };
         }
-        options.aim = match budget.strip_prefix('t') {
-            Some(threshold) => Aim::Threshold(threshold.parse().expect("a threshold")),
-            None => Aim::Ratio(budget.parse().expect("a ratio")),
-        };
+        if let Ok(rounds) = std::env::var("REFINE") {
+            options.refinements = rounds.parse().expect("rounds");
+        }
+        if let Some(threshold) = budget.strip_prefix('t') {
+            options.aim = Aim::Threshold(threshold.parse().expect("a threshold"));
+        }
         report(&btf, &options);
     }
 }

@@ -6,6 +6,8 @@ use turnlight::Selection;
 use turnlight::capture::Board;
 use turnlight::capture::board::{Dictionary, Paper, parse_length};
 use turnlight::export::web::AXES;
+use turnlight::render;
+use turnlight::scene::MOST_OBJECTS;
 use turnlight::swatch::Shape;
 use turnlight::texture::btf::{Budget, CodecKind, Precision};
 
@@ -46,6 +48,9 @@ pub(crate) struct General {
 
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
+    /// Time what this machine does
+    #[command(subcommand)]
+    Bench(BenchCommand),
     /// Draw a calibration board to print, to scale (.pdf .svg .png)
     Board(BoardArgs),
     /// Bidirectional texture functions: materials under all views and lights
@@ -57,7 +62,7 @@ pub(crate) enum Command {
     Compare(CompareArgs),
     /// Film a synthetic object, model it, compare the methods
     Demo(DemoArgs),
-    /// Write a model for the browser, or as a mesh with one picture
+    /// Write a model for the browser, for Blender, or as a mesh with one picture
     Export(ExportArgs),
     /// Make the visual hull alone (.ply .obj .glb)
     Hull(HullArgs),
@@ -77,11 +82,41 @@ pub(crate) enum Command {
     View(ViewArgs),
 }
 
+/// What is timed.
+#[derive(Debug, Subcommand)]
+pub(crate) enum BenchCommand {
+    /// Frames per second of models, stage by stage, against the speed of memory
+    Playback(BenchPlaybackArgs),
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct BenchPlaybackArgs {
+    /// Models to play [default: a bumpy ball of 20 layers of 512 x 512 texels]
+    pub(crate) models: Vec<PathBuf>,
+    /// Draw so many at once, taking the models in turn [default: 1, then 10]
+    #[arg(long, value_name = "N", value_parser = objects)]
+    pub(crate) objects: Option<usize>,
+    /// Size of the frames
+    #[arg(long, value_name = "WxH", default_value = "800x600", value_parser = size)]
+    pub(crate) size: [usize; 2],
+    /// Frames in the turn
+    #[arg(long, value_name = "N", default_value = "300", value_parser = frames)]
+    pub(crate) frames: usize,
+    /// Seed of the ball
+    #[arg(long, default_value = "1")]
+    pub(crate) seed: u64,
+    /// The file to write
+    #[arg(short, long, value_name = "REPORT.json")]
+    pub(crate) output: Option<PathBuf>,
+}
+
 /// What a model is exported to.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub(crate) enum ExportTarget {
     /// A folder with a player, for any static web server
     Web,
+    /// A folder with an add-on that imports the model and plays it for the camera
+    Blender,
     /// Mesh, material and the static look (.obj .mtl .png)
     Obj,
 }
@@ -568,7 +603,7 @@ pub(crate) struct ModelArgs {
 
 #[derive(Debug, Args)]
 pub(crate) struct RenderArgs {
-    /// The model to draw
+    /// The model to draw, or a scene of several (.json)
     pub(crate) model: PathBuf,
     /// Draw with the cameras of this capture; with --turntable, continue its orbit
     #[arg(long, value_name = "CAPTURE")]
@@ -579,6 +614,12 @@ pub(crate) struct RenderArgs {
     /// Draw one turn of this many frames
     #[arg(long, value_name = "N", value_parser = frames)]
     pub(crate) turntable: Option<usize>,
+    /// Fly smoothly through the cameras of this capture, as many frames as --frames says
+    #[arg(long, value_name = "CAPTURE", conflicts_with_all = ["cameras", "turntable"])]
+    pub(crate) path: Option<PathBuf>,
+    /// Frames of the flight
+    #[arg(long, value_name = "N", default_value = "120", requires = "path", value_parser = frames)]
+    pub(crate) frames: usize,
     /// Where the pictures go, one PNG per camera
     #[arg(short, long, value_name = "DIR", required_unless_present = "video")]
     pub(crate) output: Option<PathBuf>,
@@ -591,14 +632,34 @@ pub(crate) struct RenderArgs {
     /// Size of the frames, where no camera gives it
     #[arg(long, value_name = "WxH", value_parser = size)]
     pub(crate) size: Option<[usize; 2]>,
+    /// Colour behind the object, levels from 0 to 255 [default: transparent]
+    #[arg(long, value_name = "R,G,B", value_parser = colour)]
+    pub(crate) background: Option<[u8; 3]>,
+    /// Sub-samples along a pixel's side
+    #[arg(long, value_name = "N", default_value = "2", value_parser = supersample)]
+    pub(crate) supersample: usize,
     /// Axis of the turntable, where no capture gives it: x, y, z, -x, -y, -z
     #[arg(long, default_value = "z", value_parser = axis, allow_hyphen_values = true)]
     pub(crate) up: [f64; 3],
     /// Reduce the frames by this whole factor
     #[arg(long, value_name = "N", default_value = "1", value_parser = whole_factor)]
     pub(crate) downscale: usize,
+    /// Who draws; the picture is the same
+    #[arg(long, value_enum, default_value = "auto")]
+    pub(crate) renderer: RendererArg,
     #[command(flatten)]
     pub(crate) light: LightArgs,
+}
+
+/// Who draws.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(crate) enum RendererArg {
+    /// Graphics hardware where this build and this machine have it
+    Auto,
+    /// The CPU
+    Cpu,
+    /// Graphics hardware, or a program that stands in for it; the CPU where there is neither
+    Gpu,
 }
 
 #[derive(Debug, Args)]
@@ -813,6 +874,14 @@ fn whole_factor(text: &str) -> Result<usize, String> {
 
 fn frames(text: &str) -> Result<usize, String> {
     bounded(text, 100_000)
+}
+
+fn objects(text: &str) -> Result<usize, String> {
+    bounded(text, MOST_OBJECTS)
+}
+
+fn supersample(text: &str) -> Result<usize, String> {
+    bounded(text, render::MAX_SUPERSAMPLE)
 }
 
 fn lights(text: &str) -> Result<usize, String> {

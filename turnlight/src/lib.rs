@@ -1,6 +1,7 @@
 //! Image-based modelling from turntable photographs: the whole pipeline, the comparison of methods, and
 //! what the `turnlight` command shares with programs that call the library.
 //!
+//! - [`bench`]: how fast things go on this machine;
 //! - [`btf`]: coded materials, judged and compared;
 //! - [`pipeline`]: views → hull → simplified mesh → atlas → appearance;
 //! - [`evaluate`]: the four methods on held-out views, as JSON, CSV and one HTML page;
@@ -12,12 +13,15 @@
 //! - [`inspect`]: what a mesh, a model or a capture holds;
 //! - [`output`]: files and folders that appear whole or not at all;
 //! - [`panorama`]: light from all around;
+//! - [`projector`]: who draws a model's frames, graphics hardware or the CPU;
+//! - [`scene`]: several models in one scene, as a file;
 //! - [`serve`]: a model and its player on loopback;
 //! - [`shading`]: how the object is lit over a turn;
 //! - [`stages`]: what each stage costs;
 //! - [`swatch`]: a material on show;
 //! - [`truth`]: a mesh held against the true one.
 
+pub mod bench;
 pub mod btf;
 pub mod colmap;
 mod error;
@@ -31,6 +35,8 @@ pub mod output;
 pub mod panorama;
 pub mod pipeline;
 pub mod playback;
+pub mod projector;
+pub mod scene;
 mod selection;
 pub mod serve;
 pub mod shading;

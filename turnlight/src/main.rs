@@ -52,6 +52,7 @@ fn run(cli: &Cli) -> Result<(), Error> {
     }
     let progress = Progress::new(cli.general.quiet, cli.general.verbose);
     let answer = match &cli.command {
+        Command::Bench(command) => commands::bench::run(command, &progress),
         Command::Board(args) => commands::board::run(args),
         Command::Btf(command) => commands::btf::run(command, &progress),
         Command::Capture(args) => commands::capture::run(args, &progress),

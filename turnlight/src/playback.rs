@@ -1,7 +1,8 @@
 //! How the command and the reports draw a model.
 
+use crate::scene::{Placed, Scene};
 use render::RenderOptions;
-use render::cpu::Player;
+use render::cpu::{Object, Player};
 use render::material::{Coat, Coats, Tile};
 use texture::Model;
 
@@ -24,4 +25,14 @@ pub fn coats<'a>(model: &'a Model, tiles: &'a [Tile<'a>]) -> Option<Coats<'a>> {
     let coats: Vec<Coat<'a>> =
         layers.map(|(layer, tile)| Coat::of(&layer.material, tile, &layer.charts, layer.tile_size)).collect();
     (!coats.is_empty()).then(|| Coats::new(&model.mesh, &coats))
+}
+
+/// What stands in a scene; `coats` are those of its models.
+pub fn objects<'a>(scene: &'a Scene, coats: &'a [Option<Coats<'a>>]) -> Vec<Object<'a>> {
+    let object = |placed: &Placed| Object {
+        model: &scene.models[placed.model],
+        pose: placed.pose,
+        coats: coats.get(placed.model).and_then(Option::as_ref),
+    };
+    scene.objects.iter().map(object).collect()
 }

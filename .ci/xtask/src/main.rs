@@ -1,8 +1,8 @@
 //! Chores, run as `cargo xtask demo`, `cargo xtask test` and `cargo xtask lint`.
 //!
 //! All bring what they need: system packages through `apt-get` where it exists, and for the tests a
-//! browser, and a glTF validator and a Python environment below `target/tools`. What cannot be brought is said, and
-//! the tests that wanted it skip, saying so.
+//! browser, and a glTF validator and Python environments below `target/tools`. What cannot be brought is said, and
+//! the tests that wanted it skip, saying so. Blender is a gigabyte on disk and comes only when asked for.
 
 mod packages;
 mod tools;
@@ -11,10 +11,13 @@ use anyhow::{Context, Result, bail};
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
 
-const USAGE: &str = "usage: cargo xtask demo [ARGS] | test [ARGS] | lint [ARGS]
+const USAGE: &str = "usage: cargo xtask demo [ARGS] | test [--blender] [ARGS] | lint [ARGS]
   demo   build turnlight and run its demo; ARGS go to `turnlight demo`
   lint   run clippy over all of it; ARGS go to `cargo clippy`
-  test   run the whole test suite; ARGS go to `cargo test`";
+  test   run the whole test suite, with --blender in Blender too (374 MB once); ARGS go to `cargo test`";
+
+/// Asks for the tests in Blender.
+const BLENDER: &str = "--blender";
 
 fn main() -> ExitCode {
     let args: Vec<String> = std::env::args().skip(1).collect();
@@ -47,7 +50,14 @@ fn demo(args: &[String]) -> Result<()> {
 fn test(args: &[String]) -> Result<()> {
     packages::ensure(&[packages::COMPILER])?;
     let root = root()?;
-    let tools = tools::prepare(&root);
+    if let Err(fault) = packages::ensure(&[packages::VULKAN]) {
+        eprintln!("xtask: a Vulkan driver is not to be had ({fault:#}); where there is no other, its tests skip");
+    }
+    let (with_blender, args) = match args.split_first() {
+        Some((first, rest)) if first == BLENDER => (true, rest),
+        _ => (false, args),
+    };
+    let tools = tools::prepare(&root, with_blender);
     run(cargo(&root).args(["test", "--workspace"]).args(features()).args(args).envs(tools))
 }
 
@@ -62,10 +72,10 @@ fn lint(args: &[String]) -> Result<()> {
 /// What to build besides the default.
 fn features() -> &'static [&'static str] {
     match packages::ensure(&[packages::OPENCV, packages::CLANG]) {
-        Ok(()) => &["--features", "tests/video"],
+        Ok(()) => &["--features", "tests/gpu,tests/video"],
         Err(fault) => {
             eprintln!("xtask: OpenCV is not to be had ({fault:#}); films are neither built nor tested");
-            &[]
+            &["--features", "tests/gpu"]
         }
     }
 }

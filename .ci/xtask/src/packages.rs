@@ -23,9 +23,22 @@ pub(crate) const CLANG: Package = Package { probe: &["clang", "--version"], name
 pub(crate) const NODE: Package = Package { probe: &["npm", "--version"], names: &["nodejs", "npm"] };
 /// Plays exported models.
 pub(crate) const CHROMIUM: Package = Package { probe: &["chromium", "--version"], names: &["chromium"] };
-/// Runs the referee.
+/// Stands in for graphics hardware.
+pub(crate) const VULKAN: Package =
+    Package { probe: &["sh", "-c", "ls /usr/share/vulkan/icd.d/lvp_icd*"], names: &["mesa-vulkan-drivers"] };
+/// Runs the referee, and what we hand to Blender.
 pub(crate) const PYTHON: Package =
     Package { probe: &["python3", "-c", "import ensurepip, venv"], names: &["python3", "python3-venv"] };
+/// What Blender as a module wants of a screen, which it does not use.
+pub(crate) const SCREEN: Package = Package {
+    probe: &[
+        "python3",
+        "-c",
+        "import ctypes; libraries = 'X11.so.6 Xrender.so.1 Xfixes.so.3 Xi.so.6 xkbcommon.so.0 SM.so.6 GL.so.1'; \
+         [ctypes.CDLL('lib' + name) for name in libraries.split()]",
+    ],
+    names: &["libx11-6", "libxrender1", "libxfixes3", "libxi6", "libxkbcommon0", "libsm6", "libgl1"],
+};
 
 /// Installs what is missing of `packages`.
 pub(crate) fn ensure(packages: &[Package]) -> Result<()> {

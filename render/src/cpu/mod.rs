@@ -5,32 +5,44 @@
 //! 1. *setup*: every face becomes three edge functions over the pixels of an ideal pinhole, by
 //!    homogeneous rasterisation (Olano and Greer, Triangle Scan Conversion using 2D Homogeneous
 //!    Coordinates, 1997). They hold for faces that cross the camera plane too, so nothing is clipped;
-//! 2. *visibility*: tile by tile, the nearest face of each sub-sample, then its texture coordinates
-//!    and mip level;
-//! 3. *mips*: only as many levels as some visible sub-sample asks for;
+//! 2. *visibility*: tile by tile, the nearest face of each sub-sample of whatever object, and what the faces that show
+//!    need of their textures: which blocks, up to which mip level;
+//! 3. *blend*: just that is made: [`crate::blend`] for models, reductions of an atlas handed in;
 //! 4. *shading*: one trilinear lookup per visible sub-sample, or its material.
+//!
+//! [`Player`] draws one mesh with textures handed to it in `f32`, [`ScenePlayer`] models by what their files hold.
 //!
 //! Edge functions are evaluated in `f64` and are exactly opposite on both sides of a shared edge, so
 //! a sub-sample on the edge belongs to one of the two faces, never to both or none.
 //!
 //! A lens is exact: sub-samples are carried to the ideal plane once per camera model (microseconds
-//! each, so a second for the first frame; a [`Player`] keeps them) and faces are tested there.
+//! each, so a second for the first frame; players keep them) and faces are tested there.
+//!
+//! Loops over sub-samples are compiled for AVX2 too and take it where it is: nothing is fused or reordered, so pictures
+//! do not depend on the machine.
 
-mod fragments;
 mod samples;
+mod scene;
+mod seen;
 mod setup;
 mod shade;
 mod visibility;
 
-use crate::filter::MipChain;
-use crate::material::Lit;
+pub use scene::{Object, ScenePlayer};
+
+use crate::blend::Wanted;
+use crate::filter::{Channel, MipChain};
+use crate::material::{Coats, Lit};
+use crate::pose::Pose;
+use crate::simd::Level;
 use crate::{RenderOptions, frame_size, is_usable, resolve};
 use capture::{Camera, Image};
-use fragments::{Fragments, Scene};
 use geometry::TexturedMesh;
 use rayon::prelude::*;
 use samples::Samples;
-use shade::Look;
+use seen::{Find, Geometry, Seen};
+use setup::Faces;
+use shade::{Look, Shading};
 use std::time::{Duration, Instant};
 use visibility::Nearest;
 
@@ -39,10 +51,10 @@ use visibility::Nearest;
 pub struct StageTimes {
     /// Edge functions and bins, and the lens where it changed.
     pub setup: Duration,
-    /// Nearest faces, texture coordinates, mip levels.
+    /// Nearest faces, and what they need of their textures.
     pub visibility: Duration,
-    /// Reductions of the atlas.
-    pub mips: Duration,
+    /// Layers blended, atlases reduced.
+    pub blend: Duration,
     /// Texture lookups, averages, the picture.
     pub shading: Duration,
 }
@@ -51,11 +63,32 @@ pub struct StageTimes {
 #[derive(Debug)]
 pub struct Player<'a> {
     mesh: &'a TexturedMesh,
+    canvas: Canvas,
+}
+
+/// What frames are drawn on, kept between them.
+#[derive(Debug)]
+struct Canvas {
     options: RenderOptions,
+    level: Level,
     samples: Option<Samples>,
-    /// Kept for their memory alone.
-    tiles: Vec<Fragments>,
+    /// Kept for their memory alone, as what tiles see.
+    faces: Faces,
+    tiles: Vec<Seen>,
     times: StageTimes,
+}
+
+/// One of the meshes in a frame.
+#[derive(Debug)]
+struct Part<'a> {
+    mesh: &'a TexturedMesh,
+    pose: Pose,
+    /// Texels across and down.
+    atlas_size: [usize; 2],
+    /// What lies on the mesh.
+    coats: Option<&'a Coats<'a>>,
+    /// Where what is needed of the texture is written down.
+    wanted: &'a Wanted,
 }
 
 /// Draws one frame; the same contract as [`crate::reference::render`].
@@ -82,12 +115,12 @@ pub fn render_lit(
 impl<'a> Player<'a> {
     /// A player of `mesh`.
     pub fn new(mesh: &'a TexturedMesh, options: RenderOptions) -> Self {
-        Self { mesh, options, samples: None, tiles: Vec::new(), times: StageTimes::default() }
+        Self { mesh, canvas: Canvas::new(options) }
     }
 
     /// How long the stages of the last frame took.
     pub fn times(&self) -> StageTimes {
-        self.times
+        self.canvas.times
     }
 
     /// Draws one frame with `atlas` (encoded 0..=255, unclamped): RGBA, 8 bit encoded, not
@@ -102,12 +135,42 @@ impl<'a> Player<'a> {
     }
 
     fn draw(&mut self, atlas: &Image<[f32; 3]>, lit: Option<&Lit<'_>>, camera: &Camera) -> Image<[u8; 4]> {
+        let mut frame = Image::filled(0, 0, [0; 4]);
+        let atlas_size = [atlas.width(), atlas.height()];
+        let wanted = Wanted::none(atlas_size);
+        let coats = lit.map(|lit| lit.coats);
+        let part = Part { mesh: self.mesh, pose: Pose::default(), atlas_size, coats, wanted: &wanted };
+        self.canvas.draw(&[part], camera, &mut frame, || {
+            let chain = MipChain::build(atlas, wanted.top());
+            vec![Look { chain, lit: lit.copied(), eye: camera.center() }]
+        });
+        frame
+    }
+}
+
+impl Canvas {
+    fn new(options: RenderOptions) -> Self {
+        let (level, times) = (Level::widest(), StageTimes::default());
+        Self { options, level, samples: None, faces: Faces::default(), tiles: Vec::new(), times }
+    }
+
+    /// Draws `parts`; `looks`, one per part, are asked for when it is known what they must hold. `frame` is kept for its
+    /// memory alone.
+    fn draw<'l, T: Channel>(
+        &mut self,
+        parts: &[Part<'_>],
+        camera: &Camera,
+        frame: &mut Image<[u8; 4]>,
+        looks: impl FnOnce() -> Vec<Look<'l, T>>,
+    ) {
         self.times = StageTimes::default();
         let (width, height) = frame_size(camera);
-        let nothing = resolve::Accumulator::default().finish(1, self.options.background);
-        let mut frame = Image::filled(width, height, nothing);
+        let background = self.options.background;
+        if (frame.width(), frame.height()) != (width, height) {
+            *frame = Image::filled(width, height, [0; 4]);
+        }
         if width == 0 || height == 0 || !is_usable(camera) {
-            return frame;
+            return frame.pixels_mut().fill(resolve::Accumulator::default().finish(1, background));
         }
         let start = Instant::now();
         let n = self.options.per_side();
@@ -115,29 +178,27 @@ impl<'a> Player<'a> {
             Some(kept) if kept.fit(&camera.intrinsics, n) => kept,
             _ => Samples::new(camera, n),
         };
-        let samples = self.samples.insert(samples);
-        let faces = setup::faces(self.mesh, camera);
-        let bins = samples.bin(&faces);
+        let samples = &*self.samples.insert(samples);
+        self.faces.set_up(parts, camera, samples);
+        let faces = &self.faces;
         let binned = Instant::now();
-        let (atlas_size, coats) = ([atlas.width(), atlas.height()], lit.map(|lit| lit.coats));
-        let scene = Scene { samples, mesh: self.mesh, faces: &faces, atlas_size, coats };
-        self.tiles.resize_with(samples.tiles(), Fragments::default);
-        let find = |nearest: &mut Nearest, (tile, fragments): (usize, &mut Fragments)| {
-            fragments.find(&scene, tile, bins.of(tile), nearest);
-        };
-        self.tiles.par_iter_mut().enumerate().for_each_init(Nearest::default, find);
-        let seen = Instant::now();
-        let top = self.tiles.iter().map(Fragments::top_level).max().unwrap_or(0);
-        let chain = MipChain::build(atlas, top);
-        let reduced = Instant::now();
-        let look = Look { chain: &chain, lit, eye: camera.center(), background: self.options.background };
-        shade::frame(&mut frame, samples, &self.tiles, &look);
+        let geometry = Geometry { samples, parts, faces };
+        self.tiles.resize_with(samples.tiles(), Seen::default);
+        let level = self.level;
+        self.tiles.par_iter_mut().enumerate().for_each_init(Default::default, |state, (tile, seen)| {
+            let (nearest, candidates): &mut (Nearest, Vec<u32>) = state;
+            faces.gather(tile, candidates);
+            level.run(Find { geometry: &geometry, tile, candidates, nearest, seen });
+        });
+        let found = Instant::now();
+        let looks = looks();
+        let blended = Instant::now();
+        Shading { samples, tiles: &self.tiles, looks: &looks, background }.draw(frame, level);
         self.times = StageTimes {
             setup: binned - start,
-            visibility: seen - binned,
-            mips: reduced - seen,
-            shading: reduced.elapsed(),
+            visibility: found - binned,
+            blend: blended - found,
+            shading: blended.elapsed(),
         };
-        frame
     }
 }

@@ -15,7 +15,7 @@ pub(super) const BLOCK_SAMPLES: usize = 8;
 
 /// A box on the ideal plane; empty where nothing was put in.
 #[derive(Clone, Copy, Debug)]
-struct Bounds {
+pub(super) struct Bounds {
     low: [f64; 2],
     high: [f64; 2],
 }
@@ -49,16 +49,40 @@ pub(super) struct Samples {
 }
 
 /// Which faces each tile may see, in the order of the faces.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct Bins {
-    starts: Vec<usize>,
+    /// Of each tile, and the end; none without faces.
+    starts: Vec<u32>,
     faces: Vec<u32>,
+    /// Tiles and faces as they come; kept for its memory alone.
+    pairs: Vec<[u32; 2]>,
 }
 
 impl Bins {
     /// Indices into the faces that were binned.
     pub(super) fn of(&self, tile: usize) -> &[u32] {
-        &self.faces[self.starts[tile]..self.starts[tile + 1]]
+        let (Some(&start), Some(&end)) = (self.starts.get(tile), self.starts.get(tile + 1)) else { return &[] };
+        &self.faces[start as usize..end as usize]
+    }
+
+    /// Sorts the pairs by tile, of `tiles`; those of a tile stay in their order.
+    fn sort(&mut self, tiles: usize) {
+        self.starts.clear();
+        self.starts.resize(tiles + 1, 0);
+        // One place further on, so that each start is where the next face of its tile goes, and in the end its end.
+        self.pairs.iter().filter(|[tile, _]| (*tile as usize) + 2 <= tiles).for_each(|[tile, _]| {
+            self.starts[*tile as usize + 2] += 1;
+        });
+        for tile in 2..=tiles {
+            self.starts[tile] += self.starts[tile - 1];
+        }
+        self.faces.clear();
+        self.faces.resize(self.pairs.len(), 0);
+        for &[tile, face] in &self.pairs {
+            let slot = &mut self.starts[tile as usize + 1];
+            self.faces[*slot as usize] = face;
+            *slot += 1;
+        }
     }
 }
 
@@ -92,6 +116,11 @@ impl Samples {
         self.tiles_across * self.tiles_down
     }
 
+    /// How many tiles lie side by side.
+    pub(super) fn tiles_across(&self) -> usize {
+        self.tiles_across
+    }
+
     /// Pixel columns and rows of a tile.
     pub(super) fn tile_pixels(&self, tile: usize) -> (Range<usize>, Range<usize>) {
         let (x, y) = (tile % self.tiles_across * self.tile_px, tile / self.tiles_across * self.tile_px);
@@ -115,18 +144,37 @@ impl Samples {
         }
     }
 
+    /// Ideal pixels of sub-samples side by side from (`column`, `row`) on.
+    #[inline(always)]
+    pub(super) fn positions(&self, column: usize, row: usize, xs: &mut [f64], ys: &mut [f64]) {
+        match &self.lens {
+            None => {
+                ys.fill(sample_position(column, row, self.per_side).y);
+                xs.iter_mut().enumerate().for_each(|(k, x)| *x = sample_position(column + k, row, self.per_side).x);
+            }
+            Some(lens) => {
+                let ideal = &lens.ideal[row * self.intrinsics.width * self.per_side + column..];
+                xs.iter_mut().zip(ys).zip(ideal).for_each(|((x, y), ideal)| [*x, *y] = *ideal);
+            }
+        }
+    }
+
     /// Whether sub-samples lie on a regular grid.
     pub(super) fn is_regular(&self) -> bool {
         self.lens.is_none()
     }
 
-    /// Visits the rectangles of `patch` that a face may cover.
+    /// The sub-samples of `patch` that a face may cover, on a regular grid.
+    #[inline(always)]
+    pub(super) fn box_of(&self, patch: &Patch, face: &EdgeFace) -> Patch {
+        let columns = self.reached(face.low[0], face.high[0], &patch.columns);
+        let rows = self.reached(face.low[1], face.high[1], &patch.rows);
+        Patch { columns, rows }
+    }
+
+    /// Visits the blocks of `patch` that a face may cover, under a lens.
     pub(super) fn visit(&self, patch: &Patch, face: &EdgeFace, mut visit: impl FnMut(Patch)) {
-        let Some(lens) = &self.lens else {
-            let columns = self.reached(face.low[0], face.high[0], &patch.columns);
-            let rows = self.reached(face.low[1], face.high[1], &patch.rows);
-            return visit(Patch { columns, rows });
-        };
+        let Some(lens) = &self.lens else { return };
         let blocks = |range: &Range<usize>| range.start / BLOCK_SAMPLES..range.end.div_ceil(BLOCK_SAMPLES);
         let inside = |block: usize, range: &Range<usize>| {
             (block * BLOCK_SAMPLES).max(range.start)..((block + 1) * BLOCK_SAMPLES).min(range.end)
@@ -141,6 +189,7 @@ impl Samples {
     }
 
     /// Sub-samples on a regular grid between two pixel coordinates, within `range`.
+    #[inline(always)]
     fn reached(&self, low: f64, high: f64, range: &Range<usize>) -> Range<usize> {
         let n = self.per_side as f64;
         // Casts saturate: the infinite bounds of a face behind the camera give the whole range.
@@ -149,28 +198,21 @@ impl Samples {
         first..last.clamp(first, range.end)
     }
 
-    /// Sorts faces into tiles.
-    pub(super) fn bin(&self, faces: &[EdgeFace]) -> Bins {
-        let bounds: Vec<Bounds> = match &self.lens {
+    /// Sorts faces into tiles, of which a lens needs the bounds.
+    pub(super) fn bin(&self, faces: &[EdgeFace], bounds: &[Bounds], bins: &mut Bins) {
+        bins.pairs.clear();
+        for (index, face) in (0..).zip(faces) {
+            self.tiles_of(face, bounds, |tile| bins.pairs.push([tile as u32, index]));
+        }
+        bins.sort(self.tiles());
+    }
+
+    /// Where the sub-samples of each tile lie under a lens; nothing without.
+    pub(super) fn tile_bounds(&self) -> Vec<Bounds> {
+        match &self.lens {
             None => Vec::new(),
-            Some(_) => (0..self.tiles()).map(|tile| self.tile_bounds(tile)).collect(),
-        };
-        let mut pairs: Vec<(u32, u32)> = Vec::with_capacity(faces.len() * 3 / 2);
-        for (index, face) in faces.iter().enumerate() {
-            self.tiles_of(face, &bounds, |tile| pairs.push((tile as u32, index as u32)));
+            Some(_) => (0..self.tiles()).map(|tile| self.bounds_of(tile)).collect(),
         }
-        let mut starts = vec![0; self.tiles() + 1];
-        pairs.iter().for_each(|&(tile, _)| starts[tile as usize + 1] += 1);
-        for tile in 0..self.tiles() {
-            starts[tile + 1] += starts[tile];
-        }
-        let (mut next, mut sorted) = (starts.clone(), vec![0; pairs.len()]);
-        for (tile, face) in pairs {
-            let slot = &mut next[tile as usize];
-            sorted[*slot] = face;
-            *slot += 1;
-        }
-        Bins { starts, faces: sorted }
     }
 
     fn tiles_of(&self, face: &EdgeFace, bounds: &[Bounds], mut add: impl FnMut(usize)) {
@@ -192,7 +234,7 @@ impl Samples {
         }
     }
 
-    fn tile_bounds(&self, tile: usize) -> Bounds {
+    fn bounds_of(&self, tile: usize) -> Bounds {
         let patch = self.tile_patch(tile);
         let mut bounds = Bounds::empty();
         for row in patch.rows {

@@ -5,10 +5,11 @@
 //! weights sum to `det / depth`, `det = a · (b × c)`. All three positive, after turning back faces
 //! over, means a hit in front of the camera wherever the corners themselves may lie.
 
-use crate::face::corners;
+use super::Part;
+use super::samples::{Bins, Samples};
+use crate::face::vertex;
 use capture::{Camera, Intrinsics};
-use geometry::TexturedMesh;
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Point3, Vector3};
 use rayon::prelude::*;
 
 /// Air around a face's bounds, in pixels: more than rounding, less than matters.
@@ -26,9 +27,13 @@ pub(super) struct EdgeFace {
     pub(super) inverse_det: f64,
     /// Largest 1 / depth on the face; infinite where it reaches behind the camera.
     pub(super) nearest: f64,
+    /// Smallest 1 / depth on what of the face is in front of the camera.
+    pub(super) farthest: f64,
     /// Whether its outside is seen.
     pub(super) is_front: bool,
-    /// Index in the mesh.
+    /// The part it belongs to.
+    pub(super) part: u32,
+    /// Index in the part's mesh.
     pub(super) face: u32,
     /// Ideal pixels [x, y] that may be covered: lowest.
     pub(super) low: [f64; 2],
@@ -36,20 +41,85 @@ pub(super) struct EdgeFace {
     pub(super) high: [f64; 2],
 }
 
-/// Every face that may be seen, in the order of the mesh.
-pub(super) fn faces(mesh: &TexturedMesh, camera: &Camera) -> Vec<EdgeFace> {
-    (0..mesh.mesh.faces.len())
-        .into_par_iter()
-        .with_min_len(512)
-        .filter_map(|face| {
-            let positions = corners(mesh, face)?.positions.map(|p| camera.to_camera(&p));
-            edge_face(&positions, &camera.intrinsics, u32::try_from(face).ok()?)
-        })
-        .collect()
+/// Faces set up together: an index of a face is its batch's times this, and its own.
+const BATCH: usize = 1 << 11;
+
+/// All faces that may be seen, and the tiles they may be seen in; kept from frame to frame for their memory alone.
+#[derive(Debug, Default)]
+pub(super) struct Faces {
+    batches: Vec<Batch>,
+    /// Of each part, in the camera's coordinates.
+    vertices: Vec<Vec<Option<Vector3<f64>>>>,
 }
 
-/// `None` behind the camera, and seen exactly edge-on.
-fn edge_face(corners: &[Vector3<f64>; 3], intrinsics: &Intrinsics, face: u32) -> Option<EdgeFace> {
+#[derive(Debug, Default)]
+struct Batch {
+    faces: Vec<EdgeFace>,
+    bins: Bins,
+}
+
+impl Faces {
+    /// Sets up the faces of `parts`.
+    pub(super) fn set_up(&mut self, parts: &[Part<'_>], camera: &Camera, samples: &Samples) {
+        self.vertices.resize_with(parts.len(), Vec::new);
+        for (part, vertices) in parts.iter().zip(&mut self.vertices) {
+            let to_camera = ToCamera::new(part, camera);
+            // A vertex has six faces.
+            let place = |v: usize| vertex(part.mesh, v).map(|(position, _)| to_camera.apply(&position));
+            let count = part.mesh.mesh.positions.len();
+            (0..count).into_par_iter().with_min_len(1024).map(place).collect_into_vec(vertices);
+        }
+        let firsts = |part: &Part<'_>| (0..part.mesh.mesh.faces.len()).step_by(BATCH);
+        let places: Vec<(usize, usize)> =
+            parts.iter().enumerate().flat_map(|(k, part)| firsts(part).map(move |first| (k, first))).collect();
+        self.batches.resize_with(places.len(), Batch::default);
+        let (bounds, vertices) = (samples.tile_bounds(), &self.vertices);
+        self.batches.par_iter_mut().zip(&places).for_each(|(batch, &(part, first))| {
+            batch.faces.clear();
+            let faces = parts[part].mesh.mesh.faces[first..].iter().take(BATCH).zip(first..);
+            batch.faces.extend(faces.filter_map(|(corners, face)| {
+                let [a, b, c] = corners.map(|v| vertices[part].get(v as usize).copied().flatten());
+                let edges = edge_face(&[a?, b?, c?], &camera.intrinsics)?;
+                Some(EdgeFace { part: part as u32, face: u32::try_from(face).ok()?, ..edges })
+            }));
+            samples.bin(&batch.faces, &bounds, &mut batch.bins);
+        });
+    }
+
+    /// A face by its index.
+    #[inline]
+    pub(super) fn at(&self, index: u32) -> &EdgeFace {
+        &self.batches[index as usize / BATCH].faces[index as usize % BATCH]
+    }
+
+    /// Indices of the faces that a tile may see, in the order of the parts and of their meshes.
+    pub(super) fn gather(&self, tile: usize, candidates: &mut Vec<u32>) {
+        candidates.clear();
+        for (batch, first) in self.batches.iter().zip((0..).step_by(BATCH)) {
+            candidates.extend(batch.bins.of(tile).iter().map(|&face| first + face));
+        }
+    }
+}
+
+/// From a part's coordinates to the camera's.
+struct ToCamera {
+    linear: Matrix3<f64>,
+    translation: Vector3<f64>,
+}
+
+impl ToCamera {
+    fn new(part: &Part<'_>, camera: &Camera) -> Self {
+        let linear = camera.rotation * (part.pose.rotation * part.pose.scale);
+        Self { linear, translation: camera.rotation * part.pose.translation + camera.translation }
+    }
+
+    fn apply(&self, point: &Point3<f64>) -> Vector3<f64> {
+        self.linear * point.coords + self.translation
+    }
+}
+
+/// Of no part yet; `None` behind the camera, and seen exactly edge-on.
+fn edge_face(corners: &[Vector3<f64>; 3], intrinsics: &Intrinsics) -> Option<EdgeFace> {
     if corners.iter().all(|c| c.z <= 0.0) {
         return None;
     }
@@ -60,10 +130,12 @@ fn edge_face(corners: &[Vector3<f64>; 3], intrinsics: &Intrinsics, face: u32) ->
     let inverse_det = 1.0 / det.abs();
     let degenerate = !inverse_det.is_finite() || edges.iter().any(|e| e[0] == 0.0 && e[1] == 0.0 && e[2] <= 0.0);
     let (low, high) = bounds(corners, intrinsics);
-    let nearest = corners.iter().map(|c| if c.z > 0.0 { 1.0 / c.z } else { f64::INFINITY }).fold(0.0, f64::max);
+    let inverse_depths = corners.map(|c| if c.z > 0.0 { 1.0 / c.z } else { f64::INFINITY });
+    let (nearest, farthest) =
+        (inverse_depths.into_iter().fold(0.0, f64::max), inverse_depths.into_iter().fold(f64::INFINITY, f64::min));
     // Counter-clockwise from outside: the outward normal points at the eye.
     let is_front = det < 0.0;
-    (!degenerate).then_some(EdgeFace { edges, inverse_det, nearest, is_front, face, low, high })
+    (!degenerate).then_some(EdgeFace { edges, inverse_det, nearest, farthest, is_front, part: 0, face: 0, low, high })
 }
 
 /// `n · K⁻¹ (x, y, 1)`. Odd in `n` to the last bit, which makes shared edges watertight.

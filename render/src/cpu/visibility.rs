@@ -3,10 +3,8 @@
 use super::samples::{BLOCK_SAMPLES, Patch, Samples};
 use super::setup::{EdgeFace, Linear};
 use crate::resolve::sample_position;
+use crate::simd::{LANES, Lanes, RowTest};
 use std::ops::Range;
-
-/// Sub-samples tested side by side.
-const LANES: usize = 4;
 
 /// No face.
 pub(super) const NONE: u32 = u32::MAX;
@@ -15,6 +13,8 @@ pub(super) const NONE: u32 = u32::MAX;
 #[derive(Debug, Default)]
 pub(super) struct Nearest {
     patch: Patch,
+    /// Sub-samples from one row to the next: those of the patch, up to whole [`LANES`].
+    stride: usize,
     /// 1 / depth; zero where nothing was met.
     inverse_depths: Vec<f64>,
     /// Position in the tile's candidates.
@@ -37,7 +37,8 @@ impl Nearest {
     ///
     /// Front faces go first. On a closed mesh they then hide nearly every back face, block by block,
     /// at a fraction of the cost of testing it.
-    pub(super) fn fill<'f>(
+    #[inline(always)]
+    pub(super) fn fill<'f, E: Lanes>(
         &mut self,
         samples: &Samples,
         tile: usize,
@@ -46,7 +47,7 @@ impl Nearest {
         self.reset(samples.tile_patch(tile), samples.per_side());
         for front in [true, false] {
             for (slot, face) in candidates.clone().enumerate().filter(|(_, face)| face.is_front == front) {
-                self.add(face, slot as u32, samples);
+                self.add::<E>(face, slot as u32, samples);
             }
             if front {
                 self.summarise();
@@ -54,18 +55,18 @@ impl Nearest {
         }
     }
 
-    /// Positions in the candidates of the faces nearest to the sub-samples `columns` of `row`, all
-    /// counted over the frame; [`NONE`] where there is none.
-    pub(super) fn slots(&self, columns: Range<usize>, row: usize) -> &[u32] {
-        let start = (row - self.patch.rows.start) * self.patch.columns.len();
-        let first = start + columns.start - self.patch.columns.start;
-        &self.slots[first..first + columns.len()]
+    /// Positions in the candidates of the faces nearest to the tile's sub-samples of `row`, counted over
+    /// the frame; [`NONE`] where there is none.
+    pub(super) fn slots(&self, row: usize) -> &[u32] {
+        &self.slots[(row - self.patch.rows.start) * self.stride..][..self.patch.columns.len()]
     }
 
     fn reset(&mut self, patch: Patch, per_side: usize) {
+        self.stride = patch.columns.len().next_multiple_of(LANES);
         self.xs.clear();
-        self.xs.extend(patch.columns.clone().map(|column| sample_position(column, 0, per_side).x));
-        let samples = patch.columns.len() * patch.rows.len();
+        let columns = patch.columns.start..patch.columns.start + self.stride;
+        self.xs.extend(columns.map(|column| sample_position(column, 0, per_side).x));
+        let samples = self.stride * patch.rows.len();
         self.inverse_depths.clear();
         self.inverse_depths.resize(samples, 0.0);
         self.slots.clear();
@@ -84,7 +85,8 @@ impl Nearest {
         let (width, height) = (self.patch.columns.len(), self.patch.rows.len());
         let across = width.div_ceil(BLOCK_SAMPLES);
         self.blocks.resize(across * height.div_ceil(BLOCK_SAMPLES), f64::INFINITY);
-        for (y, row) in self.inverse_depths.chunks(width).enumerate() {
+        for (y, row) in self.inverse_depths.chunks(self.stride.max(1)).enumerate() {
+            let row = &row[..width];
             let blocks = &mut self.blocks[y / BLOCK_SAMPLES * across..][..across];
             for (block, depths) in blocks.iter_mut().zip(row.chunks(BLOCK_SAMPLES)) {
                 *block = depths.iter().copied().fold(*block, f64::min);
@@ -93,6 +95,7 @@ impl Nearest {
     }
 
     /// Whether all of `part` is known to lie in front of `face`.
+    #[inline(always)]
     fn hides(&self, part: &Patch, face: &EdgeFace) -> bool {
         if self.blocks.is_empty() {
             return false;
@@ -106,51 +109,46 @@ impl Nearest {
     }
 
     /// Puts a face in where it is nearest.
-    fn add(&mut self, face: &EdgeFace, slot: u32, samples: &Samples) {
+    #[inline(always)]
+    fn add<E: Lanes>(&mut self, face: &EdgeFace, slot: u32, samples: &Samples) {
         let patch = self.patch.clone();
-        samples.visit(&patch, face, |part| {
-            if part.columns.is_empty() || part.rows.is_empty() || self.hides(&part, face) {
-                return;
+        if samples.is_regular() {
+            let part = samples.box_of(&patch, face);
+            if !part.columns.is_empty() && !part.rows.is_empty() && !self.hides(&part, face) {
+                self.cover_grid::<E>(&part, face, slot, samples.per_side());
             }
-            if samples.is_regular() {
-                self.cover_grid(&part, face, slot, samples.per_side());
-            } else {
+            return;
+        }
+        samples.visit(&patch, face, |part| {
+            if !self.hides(&part, face) {
                 self.cover(&part, face, slot, samples);
             }
         });
     }
 
-    /// Tests sub-samples on a regular grid, a few side by side.
-    fn cover_grid(&mut self, part: &Patch, face: &EdgeFace, slot: u32, per_side: usize) {
+    /// Tests sub-samples on a regular grid, in whole [`LANES`]: a few beyond the part, which cannot be inside.
+    #[inline(always)]
+    fn cover_grid<E: Lanes>(&mut self, part: &Patch, face: &EdgeFace, slot: u32, per_side: usize) {
         let [e0, e1, e2] = &face.edges;
-        let [t0, t1, t2] = [threshold(e0), threshold(e1), threshold(e2)];
+        let (thresholds, inverse_det) = (face.edges.map(|e| threshold(&e)), face.inverse_det);
         let local = self.local(part);
-        let xs = &self.xs[local.columns.clone()];
+        let columns = local.columns.start / LANES * LANES..local.columns.end.next_multiple_of(LANES);
+        let xs = self.xs[columns.clone()].as_chunks::<LANES>().0;
         for (row, line) in part.rows.clone().zip(local.rows) {
             let y = sample_position(0, row, per_side).y;
             let (r0, r1, r2) = (e0[1] * y + e0[2], e1[1] * y + e1[2], e2[1] * y + e2[2]);
-            let start = line * self.patch.columns.len();
-            let depths = &mut self.inverse_depths[start..][local.columns.clone()];
-            let slots = &mut self.slots[start..][local.columns.clone()];
-            let lanes = xs.chunks(LANES).zip(depths.chunks_mut(LANES)).zip(slots.chunks_mut(LANES));
-            for ((xs, depths), slots) in lanes {
-                // First without a branch, so that lanes share instructions.
-                let (mut inside, mut inverse) = ([false; LANES], [0.0; LANES]);
-                for (k, x) in xs.iter().enumerate() {
-                    let (a, b, c) = (e0[0] * x + r0, e1[0] * x + r1, e2[0] * x + r2);
-                    inverse[k] = (a + b + c) * face.inverse_det;
-                    inside[k] = (a >= t0) & (b >= t1) & (c >= t2) & (inverse[k] > depths[k]);
-                }
-                for k in 0..xs.len() {
-                    if inside[k] {
-                        (depths[k], slots[k]) = (inverse[k], slot);
-                    }
-                }
+            let start = line * self.stride;
+            let depths = self.inverse_depths[start..][columns.clone()].as_chunks_mut::<LANES>().0;
+            let slots = self.slots[start..][columns.clone()].as_chunks_mut::<LANES>().0;
+            let row = RowTest { slopes: [e0[0], e1[0], e2[0]], starts: [r0, r1, r2], thresholds, inverse_det };
+            for ((xs, depths), slots) in xs.iter().zip(depths).zip(slots) {
+                E::keep_nearest(&row, xs, slot, depths, slots);
             }
         }
     }
 
     /// Tests sub-samples that lie anywhere.
+    #[inline(always)]
     fn cover(&mut self, part: &Patch, face: &EdgeFace, slot: u32, samples: &Samples) {
         let thresholds = face.edges.map(|e| threshold(&e));
         let local = self.local(part);
@@ -160,7 +158,7 @@ impl Nearest {
                 let weights = face.edges.map(|e| e[0] * x + (e[1] * y + e[2]));
                 let inverse_depth = (weights[0] + weights[1] + weights[2]) * face.inverse_det;
                 let inside = (0..3).all(|k| weights[k] >= thresholds[k]);
-                let i = line * self.patch.columns.len() + across;
+                let i = line * self.stride + across;
                 if inside && inverse_depth > self.inverse_depths[i] {
                     self.inverse_depths[i] = inverse_depth;
                     self.slots[i] = slot;

@@ -43,10 +43,18 @@ pub fn lights_of_panorama(panorama: &Image<[f32; 3]>, count: usize) -> Vec<Light
 }
 
 /// Towards the middle of a pixel.
-fn direction(panorama: &Image<[f32; 3]>, column: usize, row: usize) -> Vector3<f64> {
+pub(crate) fn direction(panorama: &Image<[f32; 3]>, column: usize, row: usize) -> Vector3<f64> {
     let azimuth = PI - TAU * (column as f64 + 0.5) / panorama.width() as f64;
     let (sin, cos) = polar(panorama, row).sin_cos();
     Vector3::new(sin * azimuth.cos(), sin * azimuth.sin(), cos)
+}
+
+/// The column and row, in pixels from the outer corner of the first, that lie in a direction of any length; the inverse of
+/// [`direction`] at their centres.
+pub(crate) fn position(panorama: &Image<[f32; 3]>, direction: &Vector3<f64>) -> [f64; 2] {
+    let azimuth = direction.y.atan2(direction.x);
+    let polar = direction.x.hypot(direction.y).atan2(direction.z);
+    [(PI - azimuth) / TAU * panorama.width() as f64, polar / PI * panorama.height() as f64]
 }
 
 fn polar(panorama: &Image<[f32; 3]>, row: usize) -> f64 {

@@ -70,6 +70,12 @@ impl Frames {
         Self { normals: welded_vertex_normals(&mesh.mesh), tangents }
     }
 
+    /// Normals and tangents at the corners of a face; zero where the mesh is broken.
+    #[cfg(feature = "gpu")]
+    pub(super) fn corners(&self, face: &[u32; 3]) -> [[Vector3<f64>; 3]; 2] {
+        [&self.normals, &self.tangents].map(|of| face.map(|v| of.get(v as usize).copied().unwrap_or_default()))
+    }
+
     /// The frame at a point of a face; `None` where the mesh is broken or flat.
     pub(super) fn at(&self, mesh: &TexturedMesh, face: usize, weights: &[f64; 3]) -> Option<TangentFrame> {
         let corners = mesh.mesh.faces.get(face)?.map(|v| v as usize);

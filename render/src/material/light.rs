@@ -51,7 +51,7 @@ impl Light {
     }
 
     /// Direction towards the light and irradiance perpendicular to it; `None` where it does not shine.
-    pub(super) fn at(&self, point: &Point3<f64>) -> Option<(Vector3<f64>, [f32; 3])> {
+    pub(crate) fn at(&self, point: &Point3<f64>) -> Option<(Vector3<f64>, [f32; 3])> {
         let (toward, irradiance) = match *self {
             Self::Directional { toward, irradiance } => (toward, irradiance),
             Self::Point { position, intensity } => {

@@ -24,6 +24,8 @@
 pub mod environment;
 pub mod frame;
 mod light;
+#[cfg(feature = "gpu")]
+pub(crate) mod numbers;
 mod tile;
 
 pub use light::{Light, Lighting};
@@ -38,6 +40,9 @@ use nalgebra::{Point2, Point3, Vector3};
 use std::collections::BTreeMap;
 use texture::btf::{DirectionSet, Material, Sampler};
 use texture::tile::{is_mirrored, texel_sizes, texels_under};
+
+/// Texels asked for at once.
+const TOGETHER: usize = 4;
 
 /// A material and where it lies.
 #[derive(Clone, Copy)]
@@ -222,9 +227,13 @@ impl<'a> Prepared<'a> {
     /// The mean over texels, in linear light.
     fn radiance(&self, taps: &[(usize, f32)], light: &Vector3<f32>, view: &Vector3<f32>) -> [f32; 3] {
         let mut sum = [0.0; 3];
-        for &(texel, weight) in taps {
-            let sample = self.coat.sampler.value(texel, light, view);
-            (0..3).for_each(|c| sum[c] += weight * self.coat.encoding.decode(sample[c]));
+        let (mut texels, mut samples) = ([0; TOGETHER], [[0.0; 3]; TOGETHER]);
+        for taps in taps.chunks(TOGETHER) {
+            texels.iter_mut().zip(taps).for_each(|(to, tap)| *to = tap.0);
+            self.coat.sampler.values(&texels[..taps.len()], light, view, &mut samples);
+            for (sample, (_, weight)) in samples.iter().zip(taps) {
+                (0..3).for_each(|c| sum[c] += weight * self.coat.encoding.decode(sample[c]));
+            }
         }
         sum.map(|s| s / self.coat.exposure)
     }

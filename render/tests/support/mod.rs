@@ -1,5 +1,7 @@
 //! Procedural meshes and cameras.
 
+#![allow(dead_code, reason = "every test binary uses some of it")]
+
 use capture::{Camera, Distortion, Image, Intrinsics};
 use geometry::{Mesh, TexturedMesh};
 use nalgebra::{Matrix3, Point2, Point3, Vector3};

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! 8   bytes  "\x89TLBTF\r\n"
-//! u16        version, 1
+//! u16        version, 2
 //! u8         codec
 //! u32        of everything before and after it, with zeros in its place: CRC-32
 //! u8 n, n    name, UTF-8
@@ -27,7 +27,7 @@ use std::fmt;
 use std::sync::Arc;
 
 const MAGIC: &[u8; 8] = b"\x89TLBTF\r\n";
-const VERSION: u16 = 1;
+const VERSION: u16 = 2;
 /// Where the checksum stands.
 const CHECKSUM_AT: usize = 11;
 /// Largest tile of a file: some codecs keep nothing per texel, so that its bytes do not bound it.

@@ -87,6 +87,11 @@ impl DirectionSet {
         &self.vectors
     }
 
+    /// What directions are interpolated over.
+    pub fn complex(&self) -> &DirectionComplex {
+        &self.complex
+    }
+
     /// The measured directions about a direction; beyond the outermost ring, the nearest point of the border.
     pub fn blend(&self, direction: &Vector3<f32>) -> Blend {
         let blend = self.lookup.blend(&self.complex, &direction.cast());

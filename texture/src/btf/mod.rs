@@ -24,6 +24,8 @@ mod budget;
 pub mod car2d;
 pub mod car3d;
 pub mod container;
+#[cfg(test)]
+mod fixtures;
 mod frame;
 pub mod gaussian_mixture;
 pub mod gmrf;
@@ -40,10 +42,12 @@ mod random_field;
 mod rows;
 mod score;
 pub mod statistics;
+mod tables;
 
 pub use container::Part;
 pub use frame::{Blend, DirectionSet, Frame};
 pub use score::{Score, score};
+pub use tables::{MixtureComponent, MixtureTables, Tables, VqTables};
 
 use crate::TextureError;
 use capture::btf::{Btf, Encoding};
@@ -59,10 +63,23 @@ pub trait Sampler: Send + Sync {
     /// surface's side; between measured directions it is interpolated. Never NaN.
     fn value(&self, texel: usize, light: &Vector3<f32>, view: &Vector3<f32>) -> [f32; 3];
 
+    /// The samples of several texels under one light and view: the same as [`Sampler::value`] per texel, by a faster
+    /// way where the codec has one. What either list has more than the other is left alone.
+    fn values(&self, texels: &[usize], light: &Vector3<f32>, view: &Vector3<f32>, out: &mut [[f32; 3]]) {
+        for (out, &texel) in out.iter_mut().zip(texels) {
+            *out = self.value(texel, light, view);
+        }
+    }
+
     /// The whole tile under one light and view, (y, x, channel): the same as [`Sampler::value`] per texel, by
     /// a faster way where the codec has one.
     fn picture(&self, light: &Vector3<f32>, view: &Vector3<f32>) -> Vec<f32> {
         (0..self.frame().texels()).flat_map(|texel| self.value(texel, light, view)).collect()
+    }
+
+    /// What [`Sampler::value`] computes with; none where the codec keeps it to itself.
+    fn tables(&self) -> Option<Tables> {
+        None
     }
 }
 

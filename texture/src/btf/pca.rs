@@ -31,14 +31,14 @@ const STANDARD: usize = 150;
 /// Weights blended at a time, on the stack.
 const BATCH: usize = 32;
 
-/// How it is fitted.
+/// How it is fitted, here and view by view.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Options {
     /// How many components.
     pub budget: Budget,
     /// How they are stored.
     pub precision: Precision,
-    /// Of the random projection.
+    /// Of the random projection; components of a view need none up to 256 lights.
     pub seed: u64,
 }
 

@@ -19,10 +19,12 @@
 //! Source: Sattler, Sarlette, Klein, "Efficient and realistic visualization of cloth", EGSR 2003.
 //! Values are not clamped above, and at 0 below.
 
+pub use super::pca::Options;
+
 use super::budget::{bytes_for, check_samples};
 use super::container::{Fault, Reader, Stored, Writer};
 use super::linear::{self, LinearModel, Source, Target, affine, blend_into};
-use super::{Blend, Budget, FitReport, Frame, Precision, Sampler};
+use super::{Blend, FitReport, Frame, Sampler};
 use crate::TextureError;
 use capture::btf::Btf;
 use nalgebra::{DMatrix, Vector3};
@@ -33,33 +35,12 @@ const STANDARD: usize = 16;
 /// Weights blended at a time, on the stack.
 const BATCH: usize = 16;
 
-/// How it is fitted.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Options {
-    /// How many components.
-    pub budget: Budget,
-    /// How they are stored.
-    pub precision: Precision,
-    /// Of the random projection, used where a view has more than 256 lights.
-    pub seed: u64,
-}
-
 /// The codec.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PcaView {
     frame: Frame,
     /// One a view; elements (texel, channel), observations lights.
     models: Vec<LinearModel>,
-}
-
-impl Options {
-    /// What a budget means for this codec.
-    ///
-    /// # Errors
-    /// Where a ratio or quality is out of range.
-    pub fn new(_btf: &Btf, budget: Budget, precision: Precision, seed: u64) -> Result<Self, TextureError> {
-        Ok(Self { budget: budget.checked()?, precision, seed })
-    }
 }
 
 /// Fits the codec. The objective is the RMSE without components, then with them.

@@ -106,7 +106,7 @@ fn psnr_db(mse: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::Frame;
+    use super::super::{Frame, fixtures};
     use super::*;
     use nalgebra::Vector3;
 
@@ -133,20 +133,9 @@ mod tests {
     }
 
     fn btf() -> Btf {
-        let directions = vec![Vector3::z(), Vector3::new(0.6, 0.0, 0.8)];
-        Btf {
-            name: "x".into(),
-            views: directions.clone(),
-            lights: directions,
-            width: 4,
-            height: 3,
-            encoding: Encoding::Srgb,
-            exposure: 1.0,
-            includes_cosine: true,
-            texel_pitch_mm: None,
-            samples: (0..4 * 36).map(|i| (i % 7) as f32 / 10.0).collect(),
-            measured: vec![true, true, true, false],
-        }
+        let directions = [Vector3::z(), Vector3::new(0.6, 0.0, 0.8)];
+        let samples = (0..4 * 36).map(|i| (i % 7) as f32 / 10.0).collect();
+        Btf { measured: vec![true, true, true, false], ..fixtures::btf([4, 3], &directions, samples) }
     }
 
     fn scored(btf: Btf, offset: f32) -> Score {

@@ -5,7 +5,7 @@ use crate::Answer;
 use crate::arguments::{ExportArgs, ExportTarget};
 use serde_json::json;
 use turnlight::Error;
-use turnlight::export::obj;
+use turnlight::export::{blender, obj};
 use turnlight::output::OutputFolder;
 use turnlight::texture::Model;
 
@@ -17,6 +17,10 @@ pub(crate) fn run(args: &ExportArgs) -> Result<Answer, Error> {
         ExportTarget::Web => {
             args.page.site(bytes).write(&folder)?;
             "serve it with any static web server; index.html is the page"
+        }
+        ExportTarget::Blender => {
+            blender::write(&bytes, &folder)?;
+            "install turnlight-addon.zip in Blender, then File > Import > Turnlight"
         }
         ExportTarget::Obj => {
             obj::write(&model, &folder)?;

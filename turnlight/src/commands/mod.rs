@@ -1,5 +1,6 @@
 //! One file per command: read, call the library, answer.
 
+pub(crate) mod bench;
 pub(crate) mod board;
 pub(crate) mod btf;
 mod btf_render;

@@ -1,17 +1,19 @@
 //! `turnlight render`
 
-use super::{read_capture, read_file};
+use super::read_capture;
 use crate::Answer;
-use crate::arguments::RenderArgs;
+use crate::arguments::{RenderArgs, RendererArg};
 use serde_json::json;
 use std::time::Instant;
 use turnlight::capture::{Aabb, Camera, Capture, Image};
 use turnlight::output::OutputFolder;
+use turnlight::projector::{Choice, Projector};
+use turnlight::render::RenderOptions;
+use turnlight::render::backdrop::put_behind;
 use turnlight::render::film::write_png;
-use turnlight::render::material::Lit;
-use turnlight::render::path::{turntable_cameras, up_axis};
+use turnlight::render::path::{smooth_cameras, turntable_cameras, up_axis};
+use turnlight::scene::Scene;
 use turnlight::stages::{Observer, Stages};
-use turnlight::texture::Model;
 use turnlight::{Error, film, playback};
 
 /// Frames of a film for which no number is given.
@@ -27,19 +29,22 @@ pub(crate) fn run(args: &RenderArgs, observer: &dyn Observer) -> Result<Answer, 
         film::check(video)?;
     }
     let mut stages = Stages::new(observer);
-    let model = stages
-        .run("read", |_| -> Result<Model, Error> { Ok(Model::from_glb(&read_file(&args.model)?, &args.model)?) })?;
-    let cameras = cameras(args, &model)?;
+    let scene = stages.run("read", |_| Scene::read(&args.model))?;
+    if scene.backdrop.is_some() && args.background.is_some() {
+        return Err(Error::Arguments("--background: the scene has a backdrop; leave one of them out".to_owned()));
+    }
+    let cameras = cameras(args, &scene)?;
     let folder = args.output.as_deref().map(OutputFolder::create).transpose()?;
     let mut times_ms = Vec::with_capacity(cameras.len());
-    stages.run("render", |observer| draw(&model, &cameras, args, folder.as_ref(), &mut times_ms, observer))?;
+    let device =
+        stages.run("render", |observer| draw(&scene, &cameras, args, folder.as_ref(), &mut times_ms, observer))?;
     if let Some(folder) = folder {
         folder.finish()?;
     }
-    Ok(answer(args, &cameras, &times_ms, &stages))
+    Ok(answer(args, &cameras, (&times_ms, &device), &stages))
 }
 
-fn answer(args: &RenderArgs, cameras: &[Numbered], times_ms: &[f64], stages: &Stages<'_>) -> Answer {
+fn answer(args: &RenderArgs, cameras: &[Numbered], (times_ms, device): (&[f64], &str), stages: &Stages<'_>) -> Answer {
     let size = cameras.first().map_or([0, 0], |(_, c)| [c.intrinsics.width, c.intrinsics.height]);
     let mut sorted = times_ms.to_vec();
     sorted.sort_by(f64::total_cmp);
@@ -53,7 +58,7 @@ fn answer(args: &RenderArgs, cameras: &[Numbered], times_ms: &[f64], stages: &St
         "width": size[0],
         "height": size[1],
         "frame_ms": frame_ms,
-        "frame_device": format!("cpu, {} threads", rayon::current_num_threads()),
+        "frame_device": device,
         "output": args.output,
         "video": args.video,
         "stages": stages.finished(),
@@ -61,7 +66,10 @@ fn answer(args: &RenderArgs, cameras: &[Numbered], times_ms: &[f64], stages: &St
     Answer { text, json }
 }
 
-fn cameras(args: &RenderArgs, model: &Model) -> Result<Vec<Numbered>, Error> {
+fn cameras(args: &RenderArgs, scene: &Scene) -> Result<Vec<Numbered>, Error> {
+    if let Some(path) = &args.path {
+        return flight(args, &read_capture(path, false)?);
+    }
     let capture = args.cameras.as_deref().map(|path| read_capture(path, false)).transpose()?;
     if let (Some(capture), None) = (&capture, args.turntable) {
         if args.size.is_some() {
@@ -71,15 +79,43 @@ fn cameras(args: &RenderArgs, model: &Model) -> Result<Vec<Numbered>, Error> {
         return Ok(positions.iter().map(|&i| (i, capture.frames[i].camera.downscaled(args.downscale))).collect());
     }
     if args.turntable.is_none() && args.video.is_none() {
-        return Err(Error::Arguments("nothing says from where to draw; give --cameras or --turntable".to_owned()));
+        return Err(Error::Arguments(
+            "nothing says from where to draw; give --cameras, --turntable or --path".to_owned(),
+        ));
     }
     let n = args.turntable.unwrap_or(TURNTABLE_FRAMES);
-    Ok(orbit(args, model, capture.as_ref(), n).into_iter().enumerate().collect())
+    Ok(orbit(args, scene, capture.as_ref(), n).into_iter().enumerate().collect())
 }
 
-fn orbit(args: &RenderArgs, model: &Model, capture: Option<&Capture>, n: usize) -> Vec<Camera> {
+/// Through the poses of a capture, in their order.
+fn flight(args: &RenderArgs, keys: &Capture) -> Result<Vec<Numbered>, Error> {
+    let mut keys: Vec<Camera> = keys.frames.iter().map(|frame| frame.camera.downscaled(args.downscale)).collect();
+    if let Some([width, height]) = args.size {
+        keys.iter_mut().for_each(|key| resize(key, [width / args.downscale, height / args.downscale]));
+    }
+    let cameras = smooth_cameras(&keys, args.frames);
+    if cameras.is_empty() {
+        return Err(Error::Arguments("--path: no camera there sees anything; give a capture with poses".to_owned()));
+    }
+    Ok(cameras.into_iter().enumerate().collect())
+}
+
+/// The same view up and down in a frame of another size.
+fn resize(camera: &mut Camera, [width, height]: [usize; 2]) {
+    let i = &mut camera.intrinsics;
+    let (width, height) = (width.max(1), height.max(1));
+    let scale = height as f64 / i.height.max(1) as f64;
+    i.fx *= scale;
+    i.fy *= scale;
+    i.skew *= scale;
+    i.cx = 0.5 * width as f64 + (i.cx - 0.5 * i.width as f64) * scale;
+    i.cy *= scale;
+    (i.width, i.height) = (width, height);
+}
+
+fn orbit(args: &RenderArgs, scene: &Scene, capture: Option<&Capture>, n: usize) -> Vec<Camera> {
     let unit = Aabb { min: [-0.5; 3].into(), max: [0.5; 3].into() };
-    let aabb = model.mesh.mesh.aabb().unwrap_or(unit);
+    let aabb = scene.aabb().unwrap_or(unit);
     let filmed: Vec<Camera> = capture.iter().flat_map(|c| &c.frames).map(|frame| frame.camera).collect();
     let up = up_axis(&filmed).unwrap_or_else(|| args.up.into());
     let like = filmed.first();
@@ -88,27 +124,36 @@ fn orbit(args: &RenderArgs, model: &Model, capture: Option<&Capture>, n: usize) 
     turntable_cameras(&aabb, like, n, size[0], size[1], up)
 }
 
-/// Draws every frame once, to the folder and to the film.
+fn choice(renderer: RendererArg) -> Choice {
+    match renderer {
+        RendererArg::Auto => Choice::Auto,
+        RendererArg::Cpu => Choice::Cpu,
+        RendererArg::Gpu => Choice::Gpu,
+    }
+}
+
+/// Draws every frame once, to the folder and to the film; says what drew them.
 fn draw(
-    model: &Model,
+    scene: &Scene,
     cameras: &[Numbered],
     args: &RenderArgs,
     folder: Option<&OutputFolder>,
     times_ms: &mut Vec<f64>,
     observer: &dyn Observer,
-) -> Result<(), Error> {
-    let mut player = playback::player(model);
-    let tiles = playback::tiles(model);
-    let coats = playback::coats(model, &tiles);
-    let lamps = args.light.lamps(model.mesh.mesh.aabb().map_or([0.0; 3], |aabb| aabb.center().into()))?;
+) -> Result<String, Error> {
+    let tiles: Vec<_> = scene.models.iter().map(playback::tiles).collect();
+    let coats: Vec<_> = scene.models.iter().zip(&tiles).map(|(model, tiles)| playback::coats(model, tiles)).collect();
+    let options = RenderOptions { supersample: args.supersample, background: args.background };
+    let mut projector = Projector::new(scene, &coats, options, choice(args.renderer))?;
+    let lamps = args.light.lamps(scene.aabb().map_or([0.0; 3], |aabb| aabb.center().into()))?;
     let mut frame = |i: usize, camera: &Camera| {
         let start = Instant::now();
-        let atlas = model.atlas(&camera.center());
-        let frame = match &coats {
-            None => player.render(&atlas, camera),
-            Some(coats) => player.render_lit(&atlas, &Lit { coats, lighting: &lamps.seen_by(camera) }, camera),
-        };
+        let mut frame = projector.frame(camera, &lamps.seen_by(camera));
+        if let Some(backdrop) = &scene.backdrop {
+            put_behind(&mut frame, backdrop, camera);
+        }
         times_ms.push(start.elapsed().as_secs_f64() * 1e3);
+        projector.take_note().iter().for_each(|note| observer.noted(note));
         observer.advanced(i + 1, cameras.len());
         frame
     };
@@ -128,5 +173,5 @@ fn draw(
         Some(video) => film::write_film(video, frames, args.fps)?,
         None => frames.for_each(drop),
     }
-    fault.map_or(Ok(()), Err)
+    fault.map_or(Ok(projector.device().to_owned()), Err)
 }

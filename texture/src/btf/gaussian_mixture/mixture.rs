@@ -7,6 +7,7 @@
 
 use super::lanes::{LANES, Row, Vector};
 use super::variables::{INPUTS, VARIABLES};
+use crate::btf::MixtureComponent;
 use std::f64::consts::{FRAC_1_SQRT_2, TAU};
 
 /// Rows of a tile; its columns are the lanes.
@@ -93,6 +94,16 @@ impl Packed {
             scale: std::array::from_fn(|v| padded(&|c| FRAC_1_SQRT_2 / c.sigma[v], 0.0)),
             joint: padded(&|c| logarithm(c, VARIABLES), NEVER),
             input: padded(&|c| logarithm(c, INPUTS), NEVER),
+        }
+    }
+
+    /// A component for its inputs.
+    pub(super) fn component(&self, m: usize) -> MixtureComponent {
+        MixtureComponent {
+            mean: std::array::from_fn(|v| self.mean[v][m]),
+            scale: std::array::from_fn(|v| self.scale[v][m]),
+            color: std::array::from_fn(|c| self.mean[INPUTS + c][m]),
+            bias: self.input[m],
         }
     }
 

@@ -20,7 +20,7 @@
 //!
 //! **Cost**: samples × M × the share that is not left out (half of 300, less of more) × rounds, the first third of
 //! which take 4 % of the samples; in memory M × (lights + views) sums for each of 32 parts and M² for the refit.
-//! An answer: M densities of six variables, sixteen at a time.
+//! An answer: M densities of six variables, sixteen at a time; those of light and eye once for texels asked for together.
 //!
 //! **Limits**: structures and highlights sharper than the components are wide are blurred, and of a tile whose
 //! texels hardly resemble their neighbours little more than the mean picture is left; the tile does not continue
@@ -46,7 +46,7 @@ mod variables;
 
 pub use storage::{Counting, printed_bytes, ratio_as_printed};
 
-use super::{Budget, FitReport, Frame, Precision, Sampler};
+use super::{Budget, FitReport, Frame, MixtureTables, Precision, Sampler, Tables};
 use crate::TextureError;
 use capture::btf::Btf;
 use estimation::{Estimate, estimate};
@@ -194,7 +194,9 @@ fn describe(found: &Estimate, asked: usize, options: &Options, notes: &mut Vec<S
 }
 
 impl GaussianMixture {
-    fn new(frame: Frame, precision: Precision, mean: Vec<u8>, components: Vec<Component>) -> Self {
+    /// Components are put into the order of their places: of sixteen side by side, all or none then matter to a texel.
+    fn new(frame: Frame, precision: Precision, mean: Vec<u8>, mut components: Vec<Component>) -> Self {
+        components.sort_by_key(|c| place_on_curve(c, &frame));
         let packed = Box::new(Packed::new(&components));
         Self { frame, precision, mean, components, packed }
     }
@@ -219,6 +221,13 @@ impl GaussianMixture {
     }
 }
 
+/// Along a curve through 256 × 256 cells that stays in each quarter, and each quarter of it, as long as it can (Morton).
+fn place_on_curve(component: &Component, frame: &Frame) -> u32 {
+    let cell = |mean: f64, side: usize| (256.0 * mean / side as f64).clamp(0.0, 255.0) as u32;
+    let (x, y) = (cell(component.mean[0], frame.width), cell(component.mean[1], frame.height));
+    (0..8).map(|bit| (x >> bit & 1) << (2 * bit) | (y >> bit & 1) << (2 * bit + 1)).sum()
+}
+
 /// α and s of light, then eye; the normal's where a vector is none.
 fn angles(light: &Vector3<f32>, view: &Vector3<f32>) -> [f32; 4] {
     let slice = |d: &Vector3<f32>| {
@@ -235,11 +244,20 @@ impl Sampler for GaussianMixture {
     }
 
     fn value(&self, texel: usize, light: &Vector3<f32>, view: &Vector3<f32>) -> [f32; 3] {
-        let (x, y) = (texel % self.frame.width, texel / self.frame.width);
-        let [la, ls, va, vs] = angles(light, view);
-        let mean = self.mean_colour(light, view);
-        let found = prediction::one(&self.packed, [x as f32 + 0.5, y as f32 + 0.5, la, ls, va, vs]);
-        [0, 1, 2].map(|c| mean[c] + found[c])
+        let mut out = [[0.0; 3]];
+        self.values(&[texel], light, view, &mut out);
+        out[0]
+    }
+
+    fn values(&self, texels: &[usize], light: &Vector3<f32>, view: &Vector3<f32>, out: &mut [[f32; 3]]) {
+        let (angles, mean) = (angles(light, view), self.mean_colour(light, view));
+        let place = |texel: usize| [texel % self.frame.width, texel / self.frame.width].map(|v| v as f32 + 0.5);
+        for (texels, out) in texels.chunks(prediction::FEW).zip(out.chunks_mut(prediction::FEW)) {
+            let mut places = [[0.0; 2]; prediction::FEW];
+            places.iter_mut().zip(texels).for_each(|(to, &texel)| *to = place(texel));
+            prediction::few(&self.packed, angles, &places[..texels.len()], out);
+            out.iter_mut().zip(texels).for_each(|(out, _)| (0..3).for_each(|c| out[c] += mean[c]));
+        }
     }
 
     fn picture(&self, light: &Vector3<f32>, view: &Vector3<f32>) -> Vec<f32> {
@@ -248,5 +266,11 @@ impl Sampler for GaussianMixture {
         let mut picture = prediction::picture(&self.packed, &x, &y, angles(light, view));
         picture.chunks_exact_mut(3).for_each(|texel| (0..3).for_each(|c| texel[c] += mean[c]));
         picture
+    }
+
+    fn tables(&self) -> Option<Tables> {
+        let components = (0..self.packed.count).map(|m| self.packed.component(m)).collect();
+        let mean = self.mean.as_chunks::<3>().0.iter().map(|m| m.map(|c| f32::from(c) / 255.0)).collect();
+        Some(Tables::GaussianMixture(MixtureTables { components, mean }))
     }
 }

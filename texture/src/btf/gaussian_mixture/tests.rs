@@ -266,9 +266,16 @@ fn one_component_answers_the_mean_everywhere() {
         all.iter().sum::<f64>() / all.len() as f64
     };
     for at in [[0.5f32; INPUTS], [7.5, 0.5, 1.5, 0.9, -1.5, -0.9]] {
-        let found = prediction::one(&codec.packed, at);
+        let found = one(&codec.packed, at);
         (0..3).for_each(|c| assert!((f64::from(found[c]) - residuals(c)).abs() < 1e-6, "{found:?}"));
     }
+}
+
+/// Colour less the mean where x, y and the angles are given.
+fn one(packed: &Packed, [x, y, la, ls, va, vs]: [f32; INPUTS]) -> [f32; 3] {
+    let mut out = [[f32::NAN; 3]];
+    prediction::few(packed, [la, ls, va, vs], &[[x, y]], &mut out);
+    out[0]
 }
 
 /// Components of equal deviations along x, with their positions as colours 0, 1, …
@@ -282,9 +289,22 @@ fn along_x(positions: &[f64], sigma: f64) -> Vec<Component> {
 }
 
 #[test]
+fn texels_asked_for_together_answer_as_alone() {
+    let codec = fitted(&striped(), 40, Precision::Full);
+    let (light, view) = (Vector3::new(0.3, -0.2, 0.9).normalize(), Vector3::new(-0.6, 0.1, 0.7).normalize());
+    let texels = [5, 0, 17, 17, 40, 3, 63, 8, 9];
+    let mut out = [[f32::NAN; 3]; 10];
+    codec.values(&texels, &light, &view, &mut out);
+    for (texel, found) in texels.into_iter().zip(&out) {
+        assert_eq!(*found, codec.value(texel, &light, &view), "{texel}");
+    }
+    assert!(out[9].iter().all(|v| v.is_nan()), "nothing was asked for there");
+}
+
+#[test]
 fn two_equal_components_share_by_a_logistic_curve() {
     let packed = Packed::new(&along_x(&[-1.0, 1.0], 0.8));
-    let found = prediction::one(&packed, [0.3, 0.0, 0.0, 0.0, 0.0, 0.0]);
+    let found = one(&packed, [0.3, 0.0, 0.0, 0.0, 0.0, 0.0]);
     assert!((found[0] - 0.718_594).abs() < 1e-6, "{found:?}");
     let picture = prediction::picture(&packed, &[0.3], &[0.0], [0.0; 4]);
     assert!((picture[0] - 0.718_594).abs() < 1e-6, "{picture:?}");
@@ -305,7 +325,7 @@ fn order_and_units_do_not_matter() {
         .collect();
     for x in [-2.0f32, 0.3, 0.9, 5.0] {
         let [a, b, c] = [(&components, x), (&reversed, x), (&scaled, 100.0 * x)]
-            .map(|(all, x)| prediction::one(&Packed::new(all), [x, 0.0, 0.0, 0.0, 0.0, 0.0])[0]);
+            .map(|(all, x)| one(&Packed::new(all), [x, 0.0, 0.0, 0.0, 0.0, 0.0])[0]);
         assert!((a - b).abs() < 1e-5 && (a - c).abs() < 1e-5, "{a} {b} {c}");
     }
 }
@@ -313,7 +333,7 @@ fn order_and_units_do_not_matter() {
 #[test]
 fn far_from_all_components_the_nearest_answers() {
     let packed = Packed::new(&along_x(&[-1.0, 1.0], 0.01));
-    assert_eq!(prediction::one(&packed, [50.0, 50.0, 1.5, 1.0, 1.5, 1.0])[0], 1.0);
+    assert_eq!(one(&packed, [50.0, 50.0, 1.5, 1.0, 1.5, 1.0])[0], 1.0);
     assert_eq!(prediction::picture(&packed, &[50.0], &[50.0], [1.5; 4])[0], 1.0);
 }
 
@@ -549,7 +569,9 @@ fn plain_loops_and_vector_instructions_agree() {
         assert!((a[0] - b[0]).abs() < 1e-4 * b[0] && (a[8] - b[8]).abs() < 1e-4 * b[8], "{a:?} {b:?}");
     }
     let at = [3.0, 4.0, 0.1, 0.2, -0.3, 0.4];
-    let [a, b] = [prediction::one(&packed, at), prediction::one_with::<Plain>(&packed, at)];
+    let mut plain = [[0.0; 3]];
+    prediction::few_with::<Plain>(&packed, [0.1, 0.2, -0.3, 0.4], &[[3.0, 4.0]], &mut plain);
+    let [a, b] = [one(&packed, at), plain[0]];
     assert!((0..3).all(|c| (a[c] - b[c]).abs() < 1e-6), "{a:?} {b:?}");
 }
 

@@ -18,8 +18,10 @@ use super::grow::{Growing, Link};
 use crate::btf::Precision;
 use crate::btf::container::{Fault, Reader, Writer};
 
+/// Bits of a scale, logarithmic.
+const SCALE_BITS: u32 = 6;
 /// Codes of a scale that are not 0, less one.
-const SCALE_STEPS: f32 = 254.0;
+const SCALE_STEPS: f32 = ((1 << SCALE_BITS) - 2) as f32;
 /// Scales are not told apart below this share of the largest.
 const SCALE_RANGE: f32 = 4096.0;
 /// Scales this near are one, for steps between them would be rounding.
@@ -241,7 +243,7 @@ impl Scales {
     fn bits(self) -> u32 {
         match self {
             Self::Equal(_) => 0,
-            Self::Logarithmic(_) => 8,
+            Self::Logarithmic(_) => SCALE_BITS,
             Self::Full => 32,
         }
     }
@@ -279,9 +281,9 @@ impl Scales {
     }
 
     fn read(from: &mut Reader<'_>) -> Result<Self, Fault> {
-        match from.u8()? {
+        match u32::from(from.u8()?) {
             0 => Ok(Self::Equal(magnitude(from.f32()?)?)),
-            8 => {
+            SCALE_BITS => {
                 let [low, high] = [magnitude(from.f32()?)?, magnitude(from.f32()?)?];
                 let sound = low > 0.0 && low <= high && (high / low).is_finite();
                 if sound {
@@ -383,6 +385,7 @@ impl Books {
         out.part("grid");
         out.u8(u8::from(self.precision == Precision::Compact));
         [grid.alpha, grid.beta, grid.theta, grid.phi].iter().for_each(|&n| out.u8(n as u8));
+        out.u8(grid.rim_deg);
         out.u8(u8::from(grid.axis == Axis::Along));
         out.part("P1");
         out.u32((self.rows.len() / grid.beta) as u32);
@@ -434,8 +437,12 @@ impl Books {
         if [alpha, beta, theta, phi].contains(&0) {
             return Err(Fault(format!("a grid of {alpha} × {beta} × {theta} × {phi}")));
         }
+        let rim_deg = from.u8()?;
+        if !(1..=90).contains(&rim_deg) {
+            return Err(Fault(format!("views down to {rim_deg}°")));
+        }
         let axis = if from.u8()? == 0 { Axis::Perpendicular } else { Axis::Along };
-        let grid = Grid { alpha, beta, theta, phi, axis };
+        let grid = Grid { alpha, beta, theta, phi, rim_deg, axis };
         let rows = read_rows(beta, precision, from)?;
         let slices = read_book(alpha, rows.len() / beta, from)?;
         let colors = read_colors(precision, from)?;

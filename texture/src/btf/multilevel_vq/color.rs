@@ -7,13 +7,16 @@
 //! encoded RGB, to which YCrCb is linear and LogLuv is not, and LogLuv's chroma of dark texels is noise; hence
 //! YCrCb for both.
 
+use crate::metrics::LUMA;
+
 /// What a unit of Y, Cr, Cb adds to the squared error of RGB, as lengths: `√(3, 0.714² + 1.402², 0.344² + 1.772²)`.
 /// Cross terms are left out, so that an error is a sum over luminance and chroma.
 pub(super) const LENGTHS: [f32; 3] = [1.732_050_8, 1.573_385_3, 1.805_081];
 
 /// Luminance, red and blue difference of an RGB triple.
 pub fn ycrcb([r, g, b]: [f32; 3]) -> [f32; 3] {
-    let y = 0.299 * r + 0.587 * g + 0.114 * b;
+    let [of_r, of_g, of_b] = LUMA.map(|weight| weight as f32);
+    let y = of_r * r + of_g * g + of_b * b;
     [y, (r - y) / 1.402, (b - y) / 1.772]
 }
 

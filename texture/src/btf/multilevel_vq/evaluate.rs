@@ -12,6 +12,7 @@ use super::books::{Books, Plane};
 use super::color::rgb;
 use super::grid::{Place, turned};
 use super::grow::Link;
+use crate::btf::VqTables;
 use nalgebra::Vector3;
 
 /// The books, laid out for look-ups.
@@ -54,6 +55,22 @@ impl Tables {
             rows: books.rows.clone(),
             color_slices: books.color_slices.iter().map(|row| row * grid.beta as u32).collect(),
             color_rows: books.color_rows.iter().map(|&c| books.colors[c as usize]).collect(),
+        }
+    }
+
+    /// The same for programs that compute elsewhere, with the texels of `plane`.
+    pub(super) fn exported(&self, books: &Books, plane: &Plane) -> VqTables {
+        let links = |links: &[Link]| links.iter().map(|link| (link.child, link.scale)).collect();
+        VqTables {
+            grid: books.grid,
+            turns: self.turns.clone(),
+            plane: links(&plane.book.links),
+            texels: links(&self.texels),
+            views: self.views.iter().map(|view| (view.slices, view.color_slices, view.scale)).collect(),
+            slices: links(&self.slices),
+            rows: self.rows.clone(),
+            color_slices: self.color_slices.clone(),
+            color_rows: self.color_rows.clone(),
         }
     }
 

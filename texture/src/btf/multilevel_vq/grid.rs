@@ -10,14 +10,23 @@
 //! α and s are uniform, hence all `n_α · n_β` cells have the solid angle `2π / (n_α n_β)`. The arccosine of the
 //! paper's equation 3 loses the sign of α and leaves its domain by rounding. At the poles α is 0.
 //!
-//! Polar angles of the view are uniform over 0..90°, both included; azimuths are uniform and wrap. Between nodes everything is
-//! interpolated linearly: the 16 corners of [`Place`].
+//! Polar angles of the view are uniform from 0 to that of the outermost measured ring, both included, and held beyond; azimuths
+//! are uniform and wrap. Between nodes everything is interpolated linearly: the 16 corners of [`Place`].
 
 use nalgebra::Vector3;
 use std::f32::consts::{FRAC_PI_2, PI, TAU};
 
 /// Below this distance from the axis A–B, α is noise.
 const POLE: f32 = 1e-7;
+/// Cells of the light's hemisphere per light of a measurement as dense that covers it all: 11 × 11 for the 81 of Bonn.
+const CELLS_PER_LIGHT: f64 = 1.1;
+/// Most cells along a side that data are given.
+const MOST_CELLS: f64 = 24.0;
+/// Measured views per squared number of polar angles; with four azimuths to a polar angle 6 × 24 for the 81 of Bonn, the
+/// rings and the azimuths of the outermost.
+const VIEWS_PER_RING: f64 = 2.25;
+/// Least weight of a polar angle, mean 1: the zenith is a sliver of the hemisphere, but what is looked at most.
+const LEAST_WEIGHT: f32 = 0.25;
 
 /// Where the poles A and B of the light's hemisphere lie.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -40,6 +49,8 @@ pub struct Grid {
     pub theta: usize,
     /// Azimuths of the view.
     pub phi: usize,
+    /// The last polar angle of the view, degrees, 1..=90.
+    pub rim_deg: u8,
     /// Where the slices meet.
     pub axis: Axis,
 }
@@ -59,12 +70,6 @@ pub(super) struct Place {
     pub(super) phi: Between,
     /// Slice and cell of the light as seen from either azimuth.
     pub(super) light: [[Between; 2]; 2],
-}
-
-impl Default for Grid {
-    fn default() -> Self {
-        Self { alpha: 11, beta: 11, theta: 7, phi: 16, axis: Axis::Perpendicular }
-    }
 }
 
 impl Between {
@@ -98,6 +103,37 @@ impl Between {
 }
 
 impl Grid {
+    /// The paper's.
+    pub const PAPER: Self = Self { alpha: 11, beta: 11, theta: 7, phi: 16, rim_deg: 90, axis: Axis::Perpendicular };
+
+    /// As fine as measured directions are: 11 × 11 × 6 × 24 for those of Bonn. A single view has one node, whatever
+    /// its azimuth.
+    pub fn of(views: &[Vector3<f64>], lights: &[Vector3<f64>]) -> Self {
+        let lowest = |all: &[Vector3<f64>]| all.iter().map(|d| d.z.clamp(0.0, 1.0)).fold(1.0, f64::min);
+        let covered = (1.0 - lowest(lights)).max(f64::EPSILON);
+        let cells = (CELLS_PER_LIGHT * lights.len() as f64 / covered).sqrt().round().clamp(1.0, MOST_CELLS) as usize;
+        let side = if lights.len() == 1 { 1 } else { cells };
+        let rings = (views.len() as f64 / VIEWS_PER_RING).sqrt().round().clamp(2.0, 60.0) as usize;
+        let [theta, phi] = if views.len() == 1 { [1, 1] } else { [rings, 4 * rings] };
+        let rim_deg = lowest(views).acos().to_degrees().round().clamp(1.0, 90.0) as u8;
+        Self { alpha: side, beta: side, theta, phi, rim_deg, axis: Axis::default() }
+    }
+
+    /// How much each polar angle of the view counts, mean 1: the solid angle of its band, but not below
+    /// [`LEAST_WEIGHT`] before that.
+    pub(super) fn view_weights(&self) -> Vec<f32> {
+        let step = self.rim() / (self.theta - 1).max(1) as f32;
+        let band = |k: usize| ((k as f32 - 0.5) * step).max(0.0).cos() - ((k as f32 + 0.5) * step).min(FRAC_PI_2).cos();
+        let bands: Vec<f32> = (0..self.theta).map(band).collect();
+        let mean = |all: &[f32]| all.iter().sum::<f32>() / all.len() as f32;
+        let raised: Vec<f32> = bands.iter().map(|b| (b / mean(&bands)).max(LEAST_WEIGHT)).collect();
+        raised.iter().map(|w| w / mean(&raised)).collect()
+    }
+
+    fn rim(&self) -> f32 {
+        f32::from(self.rim_deg).to_radians()
+    }
+
     /// Cells of the light's hemisphere.
     pub fn cells(&self) -> usize {
         self.alpha * self.beta
@@ -144,7 +180,7 @@ impl Grid {
 
     /// The direction of a node of the view.
     pub(super) fn node_direction(&self, theta: usize, phi: usize) -> Vector3<f32> {
-        let theta = FRAC_PI_2 * theta as f32 / (self.theta - 1).max(1) as f32;
+        let theta = self.rim() * theta as f32 / (self.theta - 1).max(1) as f32;
         let (sin, cos) = self.azimuth(phi).sin_cos();
         Vector3::new(theta.sin() * cos, theta.sin() * sin, theta.cos())
     }
@@ -153,7 +189,7 @@ impl Grid {
     #[inline]
     pub(super) fn view_place(&self, view: &Vector3<f32>) -> [Between; 2] {
         let radius = (view.x * view.x + view.y * view.y).sqrt();
-        let theta = atan2(radius, view.z.max(0.0)) * ((self.theta - 1) as f32 / FRAC_PI_2);
+        let theta = atan2(radius, view.z.max(0.0)) * ((self.theta - 1) as f32 / self.rim());
         let phi = if radius > 0.0 { atan2(view.y, view.x) * (self.phi as f32 / TAU) } else { 0.0 };
         [Between::held(theta, self.theta), Between::wrapped(phi, self.phi)]
     }

@@ -8,7 +8,8 @@
 //! Distances are to what the books decode to, under the best scale: of a slice `f` and an item `q` of luminance,
 //! `|f|² − ⟨f, q̂⟩²`, `q̂ = q/|q|`; chroma is not scaled. As a 3-D or 4-D item is a list of scaled items, its
 //! distance is a sum over their products, which are looked up: per texel one matrix product with P2 and one
-//! with I2, then 2 numbers of each P3 item per azimuth. The winner is tested again without cancellation.
+//! with I2, then 2 numbers of each P3 item per azimuth. The winner is tested again without cancellation. All distances are
+//! weighted by polar angle ([`Grid::view_weights`]).
 //!
 //! In its normal form a vector of luminance has mean 1; the mean goes into the scale of its parent. Black has
 //! scale 0 and whatever is nearest.
@@ -45,29 +46,31 @@ pub enum Growth {
 #[derive(Clone, Debug)]
 pub(super) struct Growing {
     pub(super) grid: Grid,
+    /// Of each polar angle of the view, mean 1.
+    pub(super) weights: Vec<f32>,
     /// P1: unit vectors of `beta` cells.
     pub(super) rows: Laesa,
     /// P2: `alpha` entries an item.
     pub(super) slices: Vec<Link>,
     /// P2 decoded, unit length, and the length of its normal form.
-    units: Vec<f32>,
-    lengths: Vec<f32>,
+    pub(super) units: Vec<f32>,
+    pub(super) lengths: Vec<f32>,
     /// C, I1 and its decoded rows.
     pub(super) colors: Laesa,
     pub(super) color_rows: Vec<u32>,
-    color_row_values: Laesa,
+    pub(super) color_row_values: Laesa,
     known_color_rows: BTreeMap<Vec<u32>, u32>,
     /// I2, decoded, and the squared length.
     pub(super) color_slices: Vec<u32>,
-    color_values: Vec<f32>,
-    color_energies: Vec<f32>,
+    pub(super) color_values: Vec<f32>,
+    pub(super) color_energies: Vec<f32>,
     known_color_slices: BTreeMap<Vec<u32>, u32>,
     /// M: P2 and I2.
     pub(super) pairs: Vec<[u32; 2]>,
     known_pairs: BTreeMap<[u32; 2], u32>,
     /// P3: `theta` entries an item; the squared length of its luminance.
     pub(super) views: Vec<Link>,
-    view_energies: Vec<f32>,
+    pub(super) view_energies: Vec<f32>,
     /// P4: `phi` entries an item.
     pub(super) texels: Vec<Link>,
 }
@@ -92,6 +95,7 @@ impl Growing {
     pub(super) fn new(grid: Grid) -> Self {
         Self {
             grid,
+            weights: grid.view_weights(),
             rows: Laesa::new(grid.beta),
             slices: Vec::new(),
             units: Vec::new(),
@@ -125,7 +129,7 @@ impl Growing {
         self.lengths.len()
     }
 
-    fn unit(&self, slice: u32) -> &[f32] {
+    pub(super) fn unit(&self, slice: u32) -> &[f32] {
         &self.units[slice as usize * self.grid.cells()..][..self.grid.cells()]
     }
 
@@ -144,8 +148,8 @@ impl Growing {
         }
         let parts: Vec<Link> = (0..self.grid.phi).map(|phi| self.encode_view(query, phi, accept, growth)).collect();
         let (item, scale) = normalised(&parts);
-        let built = self.decode(&self.texel_parts(&item, scale));
-        let error = accept.error(self.grid, query.all().as_patch(), built.as_patch());
+        let built = self.decode_texel(&item, scale);
+        let error = accept.error(self.grid, query.all().as_patch(&self.weights), built.as_patch(&self.weights));
         keep(found, error).unwrap_or_else(|| {
             self.texels.extend(&item);
             Link { child: self.texel_count() as u32 - 1, scale }
@@ -172,9 +176,9 @@ impl Growing {
         let parts: Vec<Link> = slices.clone().map(|slice| self.encode_pair(query, slice, accept, growth)).collect();
         let (item, scale) = normalised(&parts);
         let built = self.decode(&self.view_parts(&item, scale).collect::<Vec<_>>());
-        let error = accept.error(self.grid, query.patch(self.grid, slices), built.as_patch());
+        let error = accept.error(self.grid, self.patch(query, slices), built.as_patch(&self.weights));
         keep(found, error).unwrap_or_else(|| {
-            self.view_energies.push(self.view_parts(&item, 1.0).map(|part| part.gain * part.gain).sum());
+            self.view_energies.push(self.view_energy(&item));
             self.views.extend(&item);
             Link { child: self.view_count() as u32 - 1, scale }
         })
@@ -199,13 +203,14 @@ impl Growing {
     }
 
     fn encode_slice(&mut self, query: &Query, slice: usize, accept: &Acceptance, growth: Growth) -> Link {
-        let patch = query.patch(self.grid, slice..slice + 1).luma_only();
+        let weight = [self.weight(slice)];
+        let patch = query.patch(self.grid, slice..slice + 1, &weight).luma_only();
         let costs = query.dots[slice].iter().map(|dot| query.energies[slice] - dot * dot);
         let candidates = accept.shortlist(costs).into_iter().map(|item| {
             let gain = query.dots[slice][item];
             let decoded: Vec<f32> = self.unit(item as u32).iter().map(|u| gain * u).collect();
             let link = Link { child: item as u32, scale: gain / self.lengths[item] };
-            (link, accept.error(self.grid, patch, Patch { luma: &decoded, chroma: &[] }))
+            (link, accept.error(self.grid, patch, Patch { luma: &decoded, ..patch }))
         });
         let found = best(candidates);
         if let Some((link, error)) = found
@@ -213,23 +218,30 @@ impl Growing {
         {
             return link;
         }
-        let rows: Vec<Link> = patch.luma.chunks_exact(self.grid.beta).map(|row| self.encode_row(row, accept)).collect();
+        let rows: Vec<Link> =
+            patch.luma.chunks_exact(self.grid.beta).map(|row| self.encode_row(row, &weight, accept)).collect();
         let (item, scale) = normalised(&rows);
         let decoded: Vec<f32> = item.iter().flat_map(|link| self.normal_row(*link)).collect();
         let built: Vec<f32> = decoded.iter().map(|v| scale * v).collect();
-        let error = accept.error(self.grid, patch, Patch { luma: &built, chroma: &[] });
+        let error = accept.error(self.grid, patch, Patch { luma: &built, ..patch });
         if let Some(link) = keep(found, error) {
             return link;
         }
-        let length = norm(&decoded);
-        self.slices.extend(&item);
-        self.units.extend(decoded.iter().map(|v| v / length));
-        self.lengths.push(length);
+        self.push_slice(&item);
         Link { child: self.slice_count() as u32 - 1, scale }
     }
 
+    /// Appends an item to P2.
+    pub(super) fn push_slice(&mut self, item: &[Link]) {
+        let decoded: Vec<f32> = item.iter().flat_map(|link| self.normal_row(*link)).collect();
+        let length = norm(&decoded);
+        self.slices.extend(item);
+        self.units.extend(decoded.iter().map(|v| v / length));
+        self.lengths.push(length);
+    }
+
     /// The item of P1 that stands for the cells of one slice.
-    fn encode_row(&mut self, row: &[f32], accept: &Acceptance) -> Link {
+    fn encode_row(&mut self, row: &[f32], weight: &[f32], accept: &Acceptance) -> Link {
         let length = norm(row);
         if length == 0.0 && self.rows.len() > 0 {
             return Link::default();
@@ -241,8 +253,8 @@ impl Growing {
         let nearest = self.rows.nearest(&unit).map(|(item, chord)| (item, length * (1.0 - 0.5 * chord * chord)));
         let candidate = nearest.map(|(item, gain)| {
             let decoded: Vec<f32> = self.rows.vector(item).iter().map(|u| gain * u).collect();
-            let error =
-                accept.error(self.grid, Patch { luma: row, chroma: &[] }, Patch { luma: &decoded, chroma: &[] });
+            let patch = Patch { luma: row, chroma: &[], weights: weight };
+            let error = accept.error(self.grid, patch, Patch { luma: &decoded, ..patch });
             (item, gain, error)
         });
         let (item, gain) = match candidate {
@@ -260,10 +272,11 @@ impl Growing {
     }
 
     fn encode_color_slice(&mut self, query: &Query, slice: usize, accept: &Acceptance, growth: Growth) -> u32 {
-        let patch = query.patch(self.grid, slice..slice + 1).chroma_only();
+        let weight = [self.weight(slice)];
+        let patch = query.patch(self.grid, slice..slice + 1, &weight).chroma_only();
         let candidates = accept.shortlist(query.gaps[slice].iter().copied()).into_iter().map(|item| {
             let link = Link { child: item as u32, scale: 1.0 };
-            (link, accept.error(self.grid, patch, Patch { luma: &[], chroma: self.color(link.child) }))
+            (link, accept.error(self.grid, patch, Patch { chroma: self.color(link.child), ..patch }))
         });
         if let Some((link, error)) = best(candidates)
             && (growth < Growth::All || accept.takes(Level::ColorSlice, error))
@@ -271,7 +284,7 @@ impl Growing {
             return link.child;
         }
         let rows = patch.chroma.chunks_exact(2 * self.grid.beta);
-        let item: Vec<u32> = rows.map(|row| self.encode_color_row(row, accept)).collect();
+        let item: Vec<u32> = rows.map(|row| self.encode_color_row(row, weight[0], accept)).collect();
         if let Some(&known) = self.known_color_slices.get(&item) {
             return known;
         }
@@ -284,13 +297,13 @@ impl Growing {
         self.color_energies.len() as u32 - 1
     }
 
-    fn encode_color_row(&mut self, row: &[f32], accept: &Acceptance) -> u32 {
+    fn encode_color_row(&mut self, row: &[f32], weight: f32, accept: &Acceptance) -> u32 {
         if let Some((item, distance)) = self.color_row_values.nearest(row)
-            && accept.takes(Level::ColorRow, accept.rmse(f64::from(distance).powi(2), self.grid.beta))
+            && accept.takes(Level::ColorRow, accept.rmse(f64::from(weight * distance.powi(2)), self.grid.beta))
         {
             return item as u32;
         }
-        let item: Vec<u32> = row.chunks_exact(2).map(|color| self.encode_color(color, accept)).collect();
+        let item: Vec<u32> = row.chunks_exact(2).map(|color| self.encode_color(color, weight, accept)).collect();
         if let Some(&known) = self.known_color_rows.get(&item) {
             return known;
         }
@@ -300,9 +313,9 @@ impl Growing {
         self.color_row_values.insert(&decoded) as u32
     }
 
-    fn encode_color(&mut self, color: &[f32], accept: &Acceptance) -> u32 {
+    fn encode_color(&mut self, color: &[f32], weight: f32, accept: &Acceptance) -> u32 {
         match self.colors.nearest(color) {
-            Some((item, d)) if accept.takes(Level::Color, accept.rmse(f64::from(d).powi(2), 1)) => item as u32,
+            Some((item, d)) if accept.takes(Level::Color, accept.rmse(f64::from(weight * d * d), 1)) => item as u32,
             _ => self.colors.insert(color) as u32,
         }
     }
@@ -319,7 +332,7 @@ impl Growing {
             }
             [product, own, chroma]
         };
-        let all = query.energies.iter().sum::<f32>();
+        let all = self.weighted(&query.energies);
         let costs = (0..self.texel_count()).map(|item| {
             let [product, own, chroma] = sums(item);
             all - product * product / own + chroma
@@ -327,21 +340,23 @@ impl Growing {
         best(accept.shortlist(costs).into_iter().map(|item| {
             let [product, own, _] = sums(item);
             let link = Link { child: item as u32, scale: product / own };
-            let parts = self.texel_parts(&self.texels[item * self.grid.phi..][..self.grid.phi], link.scale);
-            (link, accept.error(self.grid, query.all().as_patch(), self.decode(&parts).as_patch()))
+            let decoded = self.decode_texel(&self.texels[item * self.grid.phi..][..self.grid.phi], link.scale);
+            let original = query.all();
+            (link, accept.error(self.grid, original.as_patch(&self.weights), decoded.as_patch(&self.weights)))
         }))
     }
 
-    fn nearest_view(&self, query: &Query, phi: usize, accept: &Acceptance) -> Option<(Link, f64)> {
+    pub(super) fn nearest_view(&self, query: &Query, phi: usize, accept: &Acceptance) -> Option<(Link, f64)> {
         let slices = phi * self.grid.theta..(phi + 1) * self.grid.theta;
-        let all: f32 = query.energies[slices.clone()].iter().sum();
+        let all = self.weighted(&query.energies[slices.clone()]);
         let of_item = query.sums[phi].iter().zip(&self.view_energies);
         let costs = of_item.map(|([dot, gap], own)| all - dot * dot / own + gap);
         best(accept.shortlist(costs).into_iter().map(|item| {
             let link = Link { child: item as u32, scale: query.sums[phi][item][0] / self.view_energies[item] };
             let links = &self.views[item * self.grid.theta..][..self.grid.theta];
             let decoded = self.decode(&self.view_parts(links, link.scale).collect::<Vec<_>>());
-            (link, accept.error(self.grid, query.patch(self.grid, slices.clone()), decoded.as_patch()))
+            let patch = self.patch(query, slices.clone());
+            (link, accept.error(self.grid, patch, decoded.as_patch(&self.weights)))
         }))
     }
 
@@ -353,8 +368,30 @@ impl Growing {
             let gain = dots[luma as usize];
             let decoded = self.decode(&[Part { luma, color, gain }]);
             let link = Link { child: item as u32, scale: gain / self.lengths[luma as usize] };
-            (link, accept.error(self.grid, query.patch(self.grid, slice..slice + 1), decoded.as_patch()))
+            let weight = [self.weight(slice)];
+            let patch = query.patch(self.grid, slice..slice + 1, &weight);
+            (link, accept.error(self.grid, patch, decoded.as_patch(&weight)))
         }))
+    }
+
+    /// The squared length of an item of P3.
+    pub(super) fn view_energy(&self, links: &[Link]) -> f32 {
+        self.view_parts(links, 1.0).zip(&self.weights).map(|(part, weight)| weight * part.gain * part.gain).sum()
+    }
+
+    /// How much a slice counts.
+    pub(super) fn weight(&self, slice: usize) -> f32 {
+        self.weights[slice % self.grid.theta]
+    }
+
+    /// A sum over slices, from a first polar angle on.
+    fn weighted(&self, values: &[f32]) -> f32 {
+        values.iter().zip(self.weights.iter().cycle()).map(|(value, weight)| value * weight).sum()
+    }
+
+    /// Some slices of a texel, from a first polar angle on.
+    fn patch<'a>(&'a self, query: &'a Query, slices: std::ops::Range<usize>) -> Patch<'a> {
+        query.patch(self.grid, slices, &self.weights)
     }
 
     /// What the entries of an item of P3 stand for.
@@ -366,12 +403,12 @@ impl Growing {
     }
 
     /// What the entries of an item of P4 stand for.
-    fn texel_parts(&self, links: &[Link], scale: f32) -> Vec<Part> {
+    pub(super) fn decode_texel(&self, links: &[Link], scale: f32) -> Texel {
         let views = |link: &Link| {
             let item = &self.views[link.child as usize * self.grid.theta..][..self.grid.theta];
             self.view_parts(item, scale * link.scale).collect::<Vec<_>>()
         };
-        links.iter().flat_map(views).collect()
+        self.decode(&links.iter().flat_map(views).collect::<Vec<_>>())
     }
 
     fn decode(&self, parts: &[Part]) -> Texel {
@@ -405,16 +442,17 @@ impl Query {
         }
     }
 
-    fn all(&self) -> &Texel {
+    pub(super) fn all(&self) -> &Texel {
         &self.texel
     }
 
     /// Some slices.
-    fn patch(&self, grid: Grid, slices: std::ops::Range<usize>) -> Patch<'_> {
+    fn patch<'a>(&'a self, grid: Grid, slices: std::ops::Range<usize>, weights: &'a [f32]) -> Patch<'a> {
         let cells = grid.cells();
         Patch {
             luma: &self.texel.luma[slices.start * cells..slices.end * cells],
             chroma: &self.texel.chroma[2 * slices.start * cells..2 * slices.end * cells],
+            weights,
         }
     }
 
@@ -446,9 +484,9 @@ impl Query {
         for item in self.sums[phi].len()..books.view_count() {
             let parts = books.view_parts(&books.views[item * theta..][..theta], 1.0);
             let [mut product, mut gap] = [0.0; 2];
-            for (part, slice) in parts.zip(phi * theta..) {
-                product += part.gain * self.dots[slice][part.luma as usize];
-                gap += self.gaps[slice][part.color as usize];
+            for ((part, slice), weight) in parts.zip(phi * theta..).zip(&books.weights) {
+                product += weight * part.gain * self.dots[slice][part.luma as usize];
+                gap += weight * self.gaps[slice][part.color as usize];
             }
             self.sums[phi].push([product, gap]);
         }
@@ -469,7 +507,7 @@ impl Query {
 }
 
 /// Products of items and slices of one length, (slice, item).
-fn products(items: &[f32], slices: &[f32], length: usize) -> Vec<f32> {
+pub(super) fn products(items: &[f32], slices: &[f32], length: usize) -> Vec<f32> {
     let columns = |all: &[f32]| all.len() / length;
     let items_view = DMatrixView::from_slice(items, length, columns(items));
     let slices_view = DMatrixView::from_slice(slices, length, columns(slices));
@@ -487,17 +525,17 @@ fn best(candidates: impl Iterator<Item = (Link, f64)>) -> Option<(Link, f64)> {
 }
 
 /// An item whose scales have mean 1, and the mean; black has scale 0.
-fn normalised(parts: &[Link]) -> (Vec<Link>, f32) {
+pub(super) fn normalised(parts: &[Link]) -> (Vec<Link>, f32) {
     let mean = parts.iter().map(|link| link.scale).sum::<f32>() / parts.len() as f32;
     let scaled = |link: &Link| Link { child: link.child, scale: if mean > 0.0 { link.scale / mean } else { 1.0 } };
     (parts.iter().map(scaled).collect(), mean)
 }
 
-fn mean(values: &[f32]) -> f32 {
+pub(super) fn mean(values: &[f32]) -> f32 {
     values.iter().sum::<f32>() / values.len() as f32
 }
 
-fn dot(a: &[f32], b: &[f32]) -> f32 {
+pub(super) fn dot(a: &[f32], b: &[f32]) -> f32 {
     let mut lanes = [0.0_f32; 8];
     let (a_blocks, b_blocks) = (a.chunks_exact(8), b.chunks_exact(8));
     let rest: f32 = a_blocks.remainder().iter().zip(b_blocks.remainder()).map(|(x, y)| x * y).sum();
@@ -507,7 +545,7 @@ fn dot(a: &[f32], b: &[f32]) -> f32 {
     lanes.iter().sum::<f32>() + rest
 }
 
-fn energy(values: &[f32]) -> f32 {
+pub(super) fn energy(values: &[f32]) -> f32 {
     dot(values, values)
 }
 

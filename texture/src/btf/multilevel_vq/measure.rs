@@ -50,6 +50,8 @@ pub(super) enum Level {
 pub(super) struct Patch<'a> {
     pub(super) luma: &'a [f32],
     pub(super) chroma: &'a [f32],
+    /// How much each slice counts, repeating.
+    pub(super) weights: &'a [f32],
 }
 
 /// The measure, and a threshold for each level.
@@ -88,7 +90,9 @@ impl Acceptance {
         match self.measure {
             Measure::Rmse => {
                 let cells = original.luma.len().max(original.chroma.len() / 2);
-                self.rmse(squared(original.luma, decoded.luma) + squared(original.chroma, decoded.chroma), cells)
+                let slice = cells.min(grid.cells());
+                let luma = squared(original.luma, decoded.luma, slice, original.weights);
+                self.rmse(luma + squared(original.chroma, decoded.chroma, 2 * slice, original.weights), cells)
             }
             Measure::Ssim => dissimilarity(grid, original, decoded),
         }
@@ -121,8 +125,8 @@ impl Patch<'_> {
 }
 
 impl Texel {
-    pub(super) fn as_patch(&self) -> Patch<'_> {
-        Patch { luma: &self.luma, chroma: &self.chroma }
+    pub(super) fn as_patch<'a>(&'a self, weights: &'a [f32]) -> Patch<'a> {
+        Patch { luma: &self.luma, chroma: &self.chroma, weights }
     }
 }
 
@@ -137,9 +141,11 @@ fn least(costs: impl Iterator<Item = f32>) -> Option<usize> {
     found
 }
 
-fn squared(a: &[f32], b: &[f32]) -> f64 {
-    let block = |(x, y): (&[f32], &[f32])| f64::from(x.iter().zip(y).map(|(u, v)| (u - v) * (u - v)).sum::<f32>());
-    a.chunks(128).zip(b.chunks(128)).map(block).sum()
+/// The squared distance of slices of one length, weighted in turn.
+fn squared(a: &[f32], b: &[f32], slice: usize, weights: &[f32]) -> f64 {
+    let of_slice = |(x, y): (&[f32], &[f32])| x.iter().zip(y).map(|(u, v)| (u - v) * (u - v)).sum::<f32>();
+    let slices = a.chunks(slice).zip(b.chunks(slice)).map(of_slice);
+    slices.zip(weights.iter().cycle()).map(|(squares, weight)| f64::from(squares * weight)).sum()
 }
 
 /// What 98 % of the windows do not exceed, of `1 − SSIM`.

@@ -15,29 +15,31 @@
 //!
 //! | file | what |
 //! |---|---|
-//! | `grid` | onion slices of equal solid angle, 11 × 11 × 7 × 16 |
+//! | `grid` | onion slices of equal solid angle, 11 × 11; views, 6 × 24 |
 //! | `resample` | from the measured directions to the grid |
 //! | `color` | luminance and chroma |
 //! | `measure`, `search` | when an item stands for a slice; the nearest one |
 //! | `options` | budgets, phases, thresholds |
-//! | `grow` | the nest, grown texel by texel |
+//! | `grow`, `refine` | the nest, grown texel by texel; its items made means |
 //! | `books` | few bits, and the file |
 //! | `evaluate`, `importance` | a sample; a direction |
 //!
 //! *Order*: texels of a Halton sequence; the first 1 % under the threshold, 4 % under one whose square is 2.5 times as large,
 //! the rest. In the paper the rest becomes the nearest item of P4 ([`Phase::PAPER`]), which for small tiles is a poor
 //! one; by default ([`Phase::COMBINING`]) it may add combinations of the slices there are to P4, P3 and M. *Rate*:
-//! one threshold moves all ([`Aim`]); a ratio is reached by bisecting it. *Several materials* share all but P6 ([`fit_shared`]);
+//! one threshold moves all ([`Aim`]); a ratio is reached by searching it. *Refinement*: books that have grown hold what came first;
+//! made means of what they stand for, they err by a sixth less, in fewer bytes. *Several materials* share all but P6 ([`fit_shared`]);
 //! a BRDF is a material of one texel. *Mip-maps* are P6 of radiance averaged over 2 × 2 texels, out of the same books.
 //!
-//! *Cost*: per texel 5 M multiplications to resample and `112 (121 S₂ + 242 S_I2)` to compare with all books; a
-//! sample is 16 chains of look-ups. *Limits*: 16 azimuths of the view cannot hold the 24 of the outermost measured ring; where parallax
-//! is strong, `grid.phi = 24` halves the error of the grid itself. Between the cells, 12° to 16° wide, everything is linear; beyond the outermost measured
-//! polar angle it is that of the rim; chroma is not scaled with luminance. Constant data take one item per book
-//! and no P6; black has scale 0; missing or repeated directions are bridged by the resampling.
+//! *Cost*: per texel 7 M multiplications to resample and `144 (121 S₂ + 242 S_I2)` to compare with all books, once while they
+//! grow and once a round of refinement; a sample is 16 chains of look-ups. *Limits*: between the cells, 12° to 16° wide,
+//! everything is linear; beyond the outermost measured polar angle it is that of the rim; chroma is not scaled with
+//! luminance. Constant data take one item per book and no P6; black has scale 0; missing or repeated directions are
+//! bridged by the resampling.
 //!
 //! Source: Havran, Filip, Myszkowski, "Bidirectional Texture Function Compression Based on Multi-Level Vector Quantization",
-//! Computer Graphics Forum 29(1), 2010. Taken otherwise: `s = sin β` uniform, not `cos β`; distances not squared; the 2nd, not
+//! Computer Graphics Forum 29(1), 2010. Taken otherwise: `s = sin β` uniform, not `cos β`; azimuths
+//! and polar angles as were measured, not 7 × 16 down to the horizon ([`Grid::PAPER`]); distances not squared, and weighted by polar angle; the 2nd, not
 //! 98th, percentile of SSIM; interpolation, for equation 4 is nearest.
 
 mod books;
@@ -48,6 +50,7 @@ mod grow;
 mod importance;
 mod measure;
 mod options;
+mod refine;
 mod resample;
 mod search;
 
@@ -68,7 +71,8 @@ use measure::Acceptance;
 use nalgebra::Vector3;
 use options::progressive_order;
 use rayon::prelude::*;
-use resample::Resampler;
+use refine::{Revised, Sums};
+use resample::{Resampler, Texel};
 use std::sync::Arc;
 
 /// Texels resampled as one matrix.
@@ -81,10 +85,14 @@ const SMALL_TILE: usize = 3200;
 const ROUNDS: usize = 12;
 /// A ratio may be exceeded by this share.
 const RATIO_TOLERANCE: f64 = 0.03;
+/// Of the bytes that refining saved, the share that is given out again: larger books save less.
+const GIVEN_OUT: f64 = 0.85;
 /// Beyond any logarithm of a ratio of sizes.
 const OVER_BUDGET: f64 = 1e3;
 /// The first threshold tried.
 const FIRST_THRESHOLD: f64 = 16.0;
+/// A size falls by about this power of the threshold.
+const USUAL_SLOPE: f64 = 3.5;
 /// Thresholds searched, in levels or in hundredths of `1 − SSIM`.
 const THRESHOLDS: [f64; 2] = [0.02, 200.0];
 /// Encoded samples go by about this root of radiance: 2.4 with a linear toe.
@@ -128,25 +136,39 @@ pub fn fit_shared(btfs: &[Btf], options: &Options) -> Result<(MultilevelVq, FitR
     }
     let inputs = btfs.iter().map(|btf| Input::new(btf, options)).collect::<Result<Vec<_>, _>>()?;
     let mut report = FitReport::default();
-    let codec = match options.aim {
-        Aim::Threshold(threshold) => fit_threshold(first, &inputs, options, threshold),
-        Aim::Ratio(ratio) => {
-            let raw: u64 = btfs.iter().map(Btf::raw_bytes).sum();
-            // Searched are values that fall with the threshold.
-            let bytes = |codec: &MultilevelVq| byte_count(first, codec) as f64;
-            let most = raw as f64 / ratio;
-            let range = [most / (1.0 + RATIO_TOLERANCE), most];
-            search_threshold(range, bytes, |t| fit_threshold(first, &inputs, options, t), &mut report)
-        }
+    let refined = match options.aim {
+        Aim::Threshold(threshold) => Grown::new(&inputs, options, threshold).refined(&inputs, options),
+        Aim::Ratio(ratio) => fit_ratio(btfs, &inputs, options, ratio, &mut report),
         Aim::Entries(count) => {
-            let entries = |codec: &MultilevelVq| codec.entries()[6].1 as f64;
+            let entries = |grown: &Grown| grown.books.texel_count() as f64;
             let range = [0.9 * count as f64, count as f64];
-            search_threshold(range, entries, |t| fit_threshold(first, &inputs, options, t), &mut report)
+            let grow = |threshold: f64| Grown::new(&inputs, options, threshold);
+            search_threshold(range, FIRST_THRESHOLD, entries, grow, &mut report).refined(&inputs, options)
         }
     };
+    let codec = refined.codec(first, &inputs, options);
     let sizes: Vec<String> = codec.entries().iter().map(|(book, count)| format!("{book} {count}")).collect();
     report.notes.push(format!("items: {}", sizes.join(", ")));
     Ok((codec, report))
+}
+
+/// The books of a ratio. Refining leaves some items without use: what they took is given out once more.
+fn fit_ratio(btfs: &[Btf], inputs: &[Input<'_>], options: &Options, ratio: f64, report: &mut FitReport) -> Grown {
+    let most = btfs.iter().map(Btf::raw_bytes).sum::<u64>() as f64 / ratio;
+    let bytes = |grown: &Grown| byte_count(&btfs[0], &grown.codec(&btfs[0], inputs, options)) as f64;
+    let mut search = |most: f64, from: f64| {
+        let grow = |threshold: f64| Grown::new(inputs, options, threshold);
+        search_threshold([most / (1.0 + RATIO_TOLERANCE), most], from, bytes, grow, report)
+    };
+    let grown = search(most, FIRST_THRESHOLD);
+    let (threshold, before) = (grown.threshold, bytes(&grown));
+    let refined = grown.refined(inputs, options);
+    let left = 1.0 + GIVEN_OUT * (most / bytes(&refined) - 1.0);
+    if before > most || left < 1.0 + RATIO_TOLERANCE {
+        return refined;
+    }
+    let again = search(before * left, threshold * left.powf(-1.0 / USUAL_SLOPE)).refined(inputs, options);
+    if bytes(&again) <= most { again } else { refined }
 }
 
 /// A material, and the way to its texels.
@@ -161,7 +183,7 @@ struct Input<'a> {
 
 impl<'a> Input<'a> {
     fn new(btf: &'a Btf, options: &Options) -> Result<Self, TextureError> {
-        let resampler = Resampler::new(options.grid, &btf.views, &btf.lights)?;
+        let resampler = Resampler::new(options.grid, options.ridge, &btf.views, &btf.lights)?;
         let halve = |btf: &Btf| (btf.texels() > 1).then(|| halved(btf));
         let smaller = match options.mip_maps {
             true => std::iter::successors(halve(btf), halve).collect(),
@@ -171,42 +193,105 @@ impl<'a> Input<'a> {
     }
 }
 
-/// One threshold from the first texel to the file's numbers.
-fn fit_threshold(first: &Btf, inputs: &[Input<'_>], options: &Options, threshold: f64) -> MultilevelVq {
-    let mut books = Growing::new(options.grid);
-    let mut links: Vec<Vec<Link>> = inputs.iter().map(|i| vec![Link::default(); i.order.len()]).collect();
-    let mut before = 0.0;
-    for phase in options.phases {
-        let accept = options.acceptance(threshold * phase.slack.sqrt());
-        for (input, links) in inputs.iter().zip(&mut links) {
-            let count = input.order.len();
-            let place = |share: f64| ((share * count.max(SMALL_TILE) as f64).ceil() as usize).min(count);
-            let texels = &input.order[place(before)..place(before + phase.share)];
-            encode(&mut books, input, texels, &accept, phase.growth, links);
+/// Books, and what they say of each texel.
+struct Grown {
+    books: Growing,
+    threshold: f64,
+    /// Per material and size, the links of its texels.
+    links: Vec<Vec<Vec<Link>>>,
+}
+
+impl Grown {
+    /// The books of one threshold, from the first texel to the last.
+    fn new(inputs: &[Input<'_>], options: &Options, threshold: f64) -> Self {
+        let mut books = Growing::new(options.grid);
+        let mut links: Vec<Vec<Link>> = inputs.iter().map(|i| vec![Link::default(); i.order.len()]).collect();
+        let mut before = 0.0;
+        for phase in options.phases {
+            let accept = options.acceptance(threshold * phase.slack.sqrt());
+            for (input, links) in inputs.iter().zip(&mut links) {
+                let count = input.order.len();
+                let place = |share: f64| ((share * count.max(SMALL_TILE) as f64).ceil() as usize).min(count);
+                let texels = &input.order[place(before)..place(before + phase.share)];
+                encode(&mut books, input, texels, &accept, phase.growth, links);
+            }
+            before += phase.share;
         }
-        before += phase.share;
+        let mut grown = Self { books, threshold, links: links.into_iter().map(|links| vec![links]).collect() };
+        grown.assign_smaller(inputs, options);
+        grown
     }
-    let nearest = options.acceptance(threshold);
-    let mut planes = Vec::new();
-    for (input, links) in inputs.iter().zip(links) {
-        planes.push((input.btf.width, input.btf.height, links));
-        for btf in &input.smaller {
-            let mut links = vec![Link::default(); btf.texels()];
-            let texels: Vec<usize> = (0..btf.texels()).collect();
-            let small = Input { btf, resampler: input.resampler.clone(), order: Vec::new(), smaller: Vec::new() };
-            encode(&mut books, &small, &texels, &nearest, Growth::Nothing, &mut links);
-            planes.push((btf.width, btf.height, links));
+
+    /// Finds what stands for the texels of the smaller sizes.
+    fn assign_smaller(&mut self, inputs: &[Input<'_>], options: &Options) {
+        let nearest = options.acceptance(self.threshold);
+        for (input, links) in inputs.iter().zip(&mut self.links) {
+            links.truncate(1);
+            for btf in &input.smaller {
+                let mut found = vec![Link::default(); btf.texels()];
+                let texels: Vec<usize> = (0..btf.texels()).collect();
+                let small = Input { btf, resampler: input.resampler.clone(), order: Vec::new(), smaller: Vec::new() };
+                encode(&mut self.books, &small, &texels, &nearest, Growth::Nothing, &mut found);
+                links.push(found);
+            }
         }
     }
-    let (books, planes) = settle(&books, &planes, options.precision);
-    let mut planes = planes.into_iter();
-    let materials = inputs.iter().map(|input| planes.by_ref().take(1 + input.smaller.len()).collect()).collect();
-    let power = match first.encoding {
-        Encoding::Srgb => SRGB_POWER,
-        Encoding::Linear => 1.0,
-        Encoding::Log { floor, peak } => log_power(peak / floor),
-    };
-    MultilevelVq::new(Frame::of(first), books, power, first.includes_cosine, materials)
+
+    /// Makes the books the means of what they stand for, and looks up everything once more.
+    fn refined(mut self, inputs: &[Input<'_>], options: &Options) -> Self {
+        let accept = options.acceptance(self.threshold);
+        for round in 0..=options.refinements {
+            let mut sums = Sums::new(&self.books);
+            self.revise(inputs, &accept, &mut sums);
+            if round < options.refinements {
+                self.books.become_means(&sums);
+            }
+        }
+        self.assign_smaller(inputs, options);
+        self
+    }
+
+    /// Looks up again what stands for all items of P4.
+    fn revise(&mut self, inputs: &[Input<'_>], accept: &Acceptance, sums: &mut Sums) {
+        let mut members: Vec<Vec<[usize; 2]>> = vec![Vec::new(); self.books.texel_count()];
+        for (material, links) in self.links.iter().enumerate() {
+            links[0].iter().enumerate().for_each(|(t, link)| members[link.child as usize].push([material, t]));
+        }
+        let used: Vec<usize> = (0..members.len()).filter(|&item| !members[item].is_empty()).collect();
+        for batch in used.chunks(BATCH) {
+            let revise = |&item: &usize| {
+                let of = |&[material, t]: &[usize; 2]| inputs[material].resampler.texels(inputs[material].btf, &[t]);
+                let texels: Vec<Texel> = members[item].iter().flat_map(of).collect();
+                let scales: Vec<f32> = members[item].iter().map(|&[m, t]| self.links[m][0][t].scale).collect();
+                self.books.revise(item, &texels, &scales, accept)
+            };
+            let revised: Vec<Revised> = batch.par_iter().map(revise).collect();
+            for (&item, revised) in batch.iter().zip(&revised) {
+                sums.add(&self.books, revised);
+                self.books.texels[item * self.books.grid.phi..][..self.books.grid.phi].copy_from_slice(&revised.item);
+                let scaled = members[item].iter().zip(&revised.scales);
+                scaled.for_each(|(&[m, t], &scale)| self.links[m][0][t].scale = scale);
+            }
+        }
+    }
+
+    /// The codec, its numbers brought to what the file holds.
+    fn codec(&self, first: &Btf, inputs: &[Input<'_>], options: &Options) -> MultilevelVq {
+        let of_input = |(input, links): (&Input<'_>, &Vec<Vec<Link>>)| {
+            let sizes = std::iter::once(input.btf).chain(&input.smaller).map(|btf| (btf.width, btf.height));
+            sizes.zip(links).map(|((width, height), links)| (width, height, links.clone())).collect::<Vec<_>>()
+        };
+        let planes: Vec<_> = inputs.iter().zip(&self.links).flat_map(of_input).collect();
+        let (books, planes) = settle(&self.books, &planes, options.precision);
+        let mut planes = planes.into_iter();
+        let materials = inputs.iter().map(|input| planes.by_ref().take(1 + input.smaller.len()).collect()).collect();
+        let power = match first.encoding {
+            Encoding::Srgb => SRGB_POWER,
+            Encoding::Linear => 1.0,
+            Encoding::Log { floor, peak } => log_power(peak / floor),
+        };
+        MultilevelVq::new(Frame::of(first), books, power, first.includes_cosine, materials)
+    }
 }
 
 /// The power that agrees with `exp` at the floor and at the peak: `x = 1` for the peak, `ln 2 / ln(1 + R)` for the floor.
@@ -241,32 +326,39 @@ fn encode(
     }
 }
 
-/// The threshold under which a size falls into a range: doubled or halved until it is enclosed, then bisected on its
-/// logarithm. What comes nearest, with a note, where none does.
+/// The threshold under which a size falls into a range: by the slope sizes usually have until it is enclosed, then by
+/// that between both sides, on logarithms. What comes nearest, with a note, where none does.
 fn search_threshold(
     [low, high]: [f64; 2],
-    size: impl Fn(&MultilevelVq) -> f64,
-    fit: impl Fn(f64) -> MultilevelVq,
+    first: f64,
+    size: impl Fn(&Grown) -> f64,
+    grow: impl Fn(f64) -> Grown,
     report: &mut FitReport,
-) -> MultilevelVq {
+) -> Grown {
     // Too small is allowed, too large only where nothing is small enough.
     let distance =
         |found: f64| if found > high { OVER_BUDGET + (found / high).ln() } else { (low / found).ln().max(0.0) };
-    let mut best = fit(FIRST_THRESHOLD);
+    let wanted = 0.5 * (low.ln() + high.ln());
+    let mut best = grow(first);
     let mut nearest = size(&best);
     report.objective.push(nearest);
-    let (mut at, mut found) = (FIRST_THRESHOLD, nearest);
-    let mut enclosed = THRESHOLDS;
-    while report.objective.len() < ROUNDS && distance(nearest) > 0.0 && enclosed[1] / enclosed[0] > 1.001 {
-        let next = if found > high { 2.0 * at } else { 0.5 * at };
-        enclosed = if found > high { [at, enclosed[1]] } else { [enclosed[0], at] };
-        let inside = next > enclosed[0] && next < enclosed[1];
-        at = if inside { next } else { (enclosed[0] * enclosed[1]).sqrt() };
-        let codec = fit(at);
-        found = size(&codec);
+    let (mut at, mut found) = (first.ln(), nearest);
+    let rounds = report.objective.len() + ROUNDS;
+    // Logarithms of thresholds, and of sizes beyond what is wanted.
+    let mut enclosed = THRESHOLDS.map(|t| (t.ln(), None));
+    while report.objective.len() < rounds && distance(nearest) > 0.0 && enclosed[1].0 - enclosed[0].0 > 1e-3 {
+        let excess = found.ln() - wanted;
+        enclosed[usize::from(excess < 0.0)] = (at, Some(excess));
+        let (from, width) = (enclosed[0].0, enclosed[1].0 - enclosed[0].0);
+        at = match [enclosed[0].1, enclosed[1].1] {
+            [Some(above), Some(below)] => from + width * (above / (above - below)).clamp(0.1, 0.9),
+            _ => (at + excess / USUAL_SLOPE).clamp(from + 0.01 * width, from + 0.99 * width),
+        };
+        let grown = grow(at.exp());
+        found = size(&grown);
         report.objective.push(found);
         if distance(found) < distance(nearest) {
-            (best, nearest) = (codec, found);
+            (best, nearest) = (grown, found);
         }
     }
     if distance(nearest) > 0.0 {
@@ -385,6 +477,10 @@ impl Sampler for MultilevelVq {
     fn picture(&self, light: &Vector3<f32>, view: &Vector3<f32>) -> Vec<f32> {
         let place = self.tables.place(&self.books, light, view);
         (0..self.frame.texels()).flat_map(|t| self.tables.value(&self.books, self.plane(), t, &place)).collect()
+    }
+
+    fn tables(&self) -> Option<super::Tables> {
+        Some(super::Tables::MultilevelVq(self.tables.exported(&self.books, self.plane())))
     }
 }
 

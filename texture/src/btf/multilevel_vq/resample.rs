@@ -7,7 +7,7 @@
 //!
 //! The system `A` depends on directions alone, so the weights are found once, and rows of `W` sum to 1. Nodes beyond the
 //! outermost measured ring take its values. `B` (sites × nodes) is how the codec interpolates; the correction `W'`, the
-//! smallest that does it, makes that interpolation return what was measured: a grid filled by plain `W` smooths.
+//! smallest that does it but for the ridge μ, makes that interpolation return what was measured: a grid filled by plain `W` smooths.
 //! The pseudo-inverse answers for one light, for coplanar and for repeated directions.
 //!
 //! Cost: 2.1 M multiplications a texel for the views and 3.3 M for the lights (81 × 81 onto 11 × 11 × 7 × 16), as matrix products.
@@ -20,8 +20,6 @@ use nalgebra::{DMatrix, DMatrixView, Vector3};
 
 /// Singular values of the basis functions' system below this share of the largest are 0.
 const RANK_TOLERANCE: f64 = 1e-9;
-/// Ridge of the correction: what several directions of one cell say differently is multiplied by `1/(2√μ)` at most.
-const RIDGE: f64 = 0.05;
 /// Rounds within which singular values are found.
 const MAX_ROUNDS: usize = 10_000;
 
@@ -49,7 +47,12 @@ impl Resampler {
     ///
     /// # Errors
     /// Where the system cannot be solved, which no finite directions bring about.
-    pub(super) fn new(grid: Grid, views: &[Vector3<f64>], lights: &[Vector3<f64>]) -> Result<Self, TextureError> {
+    pub(super) fn new(
+        grid: Grid,
+        ridge: f64,
+        views: &[Vector3<f64>],
+        lights: &[Vector3<f64>],
+    ) -> Result<Self, TextureError> {
         let nodes: Vec<Vector3<f64>> =
             (0..grid.nodes()).map(|n| grid.node_direction(n % grid.theta, n / grid.theta).cast()).collect();
         let view_weights = |d: &Vector3<f64>| {
@@ -64,10 +67,10 @@ impl Resampler {
                 let [slice, cell] = grid.light_place(&turned(&d.cast(), [cos, sin]));
                 corners(slice, cell, grid.beta)
             };
-            weights(lights, &cells, light_weights)
+            weights(lights, &cells, ridge, light_weights)
         };
         let lights = (0..grid.phi).map(for_azimuth).collect::<Result<_, _>>()?;
-        Ok(Self { grid, views: weights(views, &nodes, view_weights)?, lights })
+        Ok(Self { grid, views: weights(views, &nodes, ridge, view_weights)?, lights })
     }
 
     /// Some texels of the data on the grid.
@@ -113,6 +116,7 @@ fn corners(slow: Between, fast: Between, fast_count: usize) -> [(usize, f64); 4]
 fn weights(
     sites: &[Vector3<f64>],
     nodes: &[Vector3<f64>],
+    ridge: f64,
     between: impl Fn(&Vector3<f64>) -> [(usize, f64); 4],
 ) -> Result<DMatrix<f32>, TextureError> {
     let plain = radial_weights(sites, nodes)?;
@@ -121,7 +125,7 @@ fn weights(
         between(direction).iter().for_each(|&(node, weight)| back[(site, node)] += weight);
     }
     let missing = DMatrix::identity(sites.len(), sites.len()) - &back * &plain;
-    let normal = &back * back.transpose() + DMatrix::identity(sites.len(), sites.len()) * RIDGE;
+    let normal = &back * back.transpose() + DMatrix::identity(sites.len(), sites.len()) * ridge;
     let solved = normal.cholesky().ok_or_else(unsolved)?.solve(&missing);
     Ok((plain + back.transpose() * solved).transpose().cast())
 }

@@ -4,7 +4,7 @@ use crate::btf::car2d::{Car2d, Causal};
 use crate::btf::car3d::{Car3d, VectorModel};
 use crate::btf::container::Stored;
 use crate::btf::gmrf::{Gmrf, Markov};
-use crate::btf::{Codec, CodecKind, FitOptions, Material, Synthesizer, statistics};
+use crate::btf::{Codec, CodecKind, FitOptions, Material, Synthesizer, fixtures, statistics};
 use capture::btf::Encoding;
 use proptest::prelude::*;
 use std::sync::LazyLock;
@@ -165,19 +165,7 @@ fn striped() -> Btf {
             samples.extend([level, 0.8 * level, 0.3 * level + 0.1].map(|v| v.clamp(0.0, 1.0) as f32));
         }
     }
-    Btf {
-        name: "striped".into(),
-        views: directions.clone(),
-        lights: directions,
-        width: 16,
-        height: 16,
-        encoding: Encoding::Srgb,
-        exposure: 1.0,
-        includes_cosine: true,
-        texel_pitch_mm: None,
-        samples,
-        measured: Vec::new(),
-    }
+    fixtures::btf([16, 16], &directions, samples)
 }
 
 fn fitted(btf: &Btf, codec: CodecKind, budget: Budget) -> (Material, FitReport) {

@@ -1,0 +1,156 @@
+//! Who draws a scene's frames: graphics hardware where it is there and able, the CPU otherwise.
+
+use crate::scene::Scene;
+use crate::{Error, playback};
+use capture::{Camera, Image};
+#[cfg(feature = "gpu")]
+use render::Pose;
+use render::RenderOptions;
+use render::cpu::ScenePlayer;
+#[cfg(feature = "gpu")]
+use render::gpu;
+use render::material::{Coats, Lighting};
+
+/// Who is to draw.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Choice {
+    /// Graphics hardware; the CPU where there is none, or none but a program that stands in for it.
+    #[default]
+    Auto,
+    /// The CPU.
+    Cpu,
+    /// Whatever adapter there is; the CPU where there is none.
+    Gpu,
+}
+
+/// Draws the frames of a scene; the picture is the same whoever draws it.
+#[derive(Debug)]
+pub struct Projector<'a> {
+    player: ScenePlayer<'a>,
+    #[cfg(feature = "gpu")]
+    hardware: Option<Hardware<'a>>,
+    device: String,
+    note: Option<String>,
+}
+
+/// Graphics hardware, with a model on it.
+#[cfg(feature = "gpu")]
+#[derive(Debug)]
+struct Hardware<'a> {
+    renderer: gpu::Renderer<'a>,
+    is_lit: bool,
+    options: RenderOptions,
+}
+
+impl<'a> Projector<'a> {
+    /// A projector of `scene`, with the materials that were laid over its models. Graphics hardware draws one model
+    /// where its own coordinates are the world's; the CPU draws whatever else there is.
+    ///
+    /// # Errors
+    /// [`Error::Arguments`] where graphics hardware is asked for in a build without.
+    pub fn new(
+        scene: &'a Scene,
+        coats: &'a [Option<Coats<'a>>],
+        options: RenderOptions,
+        choice: Choice,
+    ) -> Result<Self, Error> {
+        if choice == Choice::Gpu && !cfg!(feature = "gpu") {
+            return Err(Error::Arguments(
+                "this turnlight was built without graphics hardware; let the CPU draw, or build it with --features gpu"
+                    .to_owned(),
+            ));
+        }
+        let projector = Self {
+            player: ScenePlayer::new(&playback::objects(scene, coats), options),
+            #[cfg(feature = "gpu")]
+            hardware: None,
+            device: of_cpu(),
+            note: None,
+        };
+        #[cfg(feature = "gpu")]
+        let projector = match choice {
+            Choice::Cpu => projector,
+            _ => projector.handed_over(Hardware::new(scene, coats, options, choice)),
+        };
+        Ok(projector)
+    }
+
+    /// What draws, in a few words.
+    pub fn device(&self) -> &str {
+        &self.device
+    }
+
+    /// What the user should know, once: why the CPU draws although it was not asked to.
+    pub fn take_note(&mut self) -> Option<String> {
+        self.note.take()
+    }
+
+    /// Draws one frame: RGBA, 8 bit encoded, not premultiplied, alpha the coverage of the pixel.
+    pub fn frame(&mut self, camera: &Camera, lighting: &Lighting) -> Image<[u8; 4]> {
+        #[cfg(feature = "gpu")]
+        if let Some(frame) = self.frame_of_hardware(camera, lighting) {
+            return frame;
+        }
+        self.player.render(camera, lighting)
+    }
+}
+
+#[cfg(feature = "gpu")]
+impl<'a> Projector<'a> {
+    fn handed_over(self, found: Result<(Hardware<'a>, String), gpu::GpuError>) -> Self {
+        match found {
+            Ok((hardware, name)) => Self { hardware: Some(hardware), device: format!("gpu, {name}"), ..self },
+            Err(fault) => Self { note: Some(format!("the CPU draws: {fault}")), ..self },
+        }
+    }
+
+    /// `None` where the CPU is to draw; after a fault it draws the rest, too.
+    fn frame_of_hardware(&mut self, camera: &Camera, lighting: &Lighting) -> Option<Image<[u8; 4]>> {
+        match self.hardware.as_mut()?.frame(camera, lighting) {
+            Ok(frame) => Some(frame),
+            Err(fault) => {
+                self.hardware = None;
+                self.device = of_cpu();
+                self.note = Some(format!("the CPU draws: {fault}"));
+                None
+            }
+        }
+    }
+}
+
+#[cfg(feature = "gpu")]
+impl<'a> Hardware<'a> {
+    /// With the adapter's name.
+    fn new(
+        scene: &'a Scene,
+        coats: &'a [Option<Coats<'a>>],
+        options: RenderOptions,
+        choice: Choice,
+    ) -> Result<(Self, String), gpu::GpuError> {
+        let alone = match scene.objects[..] {
+            [object] if object.pose == Pose::default() => scene.models.get(object.model).map(|m| (object.model, m)),
+            _ => None,
+        };
+        let Some((at, model)) = alone else {
+            return Err(gpu::GpuError::Unsupported { what: "a scene of other than one model in its place".to_owned() });
+        };
+        let device = gpu::Device::headless()?;
+        if choice == Choice::Auto && device.is_software() {
+            let fault = format!("{} is itself a program on the CPU", device.name());
+            return Err(gpu::GpuError::NoAdapter { fault });
+        }
+        let mut renderer = gpu::Renderer::new(&device, model)?;
+        let coats = coats.get(at).and_then(Option::as_ref);
+        coats.map_or(Ok(()), |coats| renderer.lay(coats))?;
+        Ok((Self { renderer, is_lit: coats.is_some(), options }, device.name().to_owned()))
+    }
+
+    fn frame(&mut self, camera: &Camera, lighting: &Lighting) -> Result<Image<[u8; 4]>, gpu::GpuError> {
+        let lighting = self.is_lit.then_some(lighting);
+        self.renderer.render(&gpu::Shot { camera, lighting, options: self.options })
+    }
+}
+
+fn of_cpu() -> String {
+    format!("cpu, {} threads", rayon::current_num_threads())
+}
