@@ -283,6 +283,9 @@ pub(crate) struct BtfRenderArgs {
     /// What stands behind, 0 to 255 [default: nothing, transparent]
     #[arg(long, value_name = "R,G,B", value_parser = colour)]
     pub(crate) background: Option<[u8; 3]>,
+    /// Sub-samples along a pixel's side; of shapes
+    #[arg(long, value_name = "N", default_value = "2", value_parser = supersample)]
+    pub(crate) supersample: usize,
     /// Seed of synthesis
     #[arg(long, default_value = "1")]
     pub(crate) seed: u64,

@@ -66,7 +66,7 @@ fn curved(
     let camera: Camera = swatch::camera(&mesh.mesh, &direction(args.view.unwrap_or(VIEW_DEG)).into(), args.size);
     let middle = mesh.mesh.aabb().map_or([0.0; 3], |aabb| aabb.center().into());
     let lighting = args.light.lamps(middle)?.seen_by(&camera);
-    let options = RenderOptions { supersample: 2, background: args.background };
+    let options = RenderOptions { supersample: args.supersample, background: args.background };
     let nothing = Image::filled(mesh.atlas_size[0], mesh.atlas_size[1], [0.0; 3]);
     Ok(cpu::render_lit(mesh, &nothing, &Lit { coats: &coats, lighting: &lighting }, &camera, &options))
 }
