@@ -5,10 +5,8 @@
 #![allow(clippy::unwrap_used, reason = "a helper that fails ends the bench")]
 
 #[path = "../tests/support/models.rs"]
-#[expect(dead_code, reason = "not every method is timed")]
 mod models;
 #[path = "../tests/support/mod.rs"]
-#[expect(dead_code, reason = "one of its shapes is enough here")]
 mod support;
 
 use capture::Camera;

@@ -1,8 +1,8 @@
 //! How many milliseconds does a frame take, stage by stage? First one mesh of 20 000 triangles with an atlas of 1024² texels
 //! in `f32`, beside the naive renderer; then models of 512² texels, blended for every frame.
 
-#[path = "../tests/support/closed_forms.rs"]
-mod closed_forms;
+#[path = "../tests/support/models.rs"]
+mod models;
 #[path = "../tests/support/mod.rs"]
 mod support;
 
@@ -114,13 +114,13 @@ fn turn(what: &str, model: &Model, objects: usize) {
 
 fn models() {
     println!("\n{:34} | setup | visibility | blend | shading | all   |", "ms, medians of 300 frames, 800×600");
-    let ball = || closed_forms::bumpy_ball(29, [512, 512]);
-    let basis = closed_forms::dyntex(ball(), 20, 100, |_| 20);
+    let ball = || models::bumpy_ball(29, [512, 512]);
+    let basis = models::dyntex(ball(), 20, 100, |_| 20);
     turn("dyntex, 20 layers", &basis, 1);
     turn("ten of them", &basis, 10);
-    turn("vdtm, 20 layers", &closed_forms::vdtm(ball(), 20), 1);
-    turn("static", &closed_forms::still(ball()), 1);
-    turn("lumigraph, 20 rays", &closed_forms::lumigraph(ball(), 20), 1);
+    turn("vdtm, 20 layers", &models::vdtm(ball(), 20), 1);
+    turn("static", &models::still(ball()), 1);
+    turn("lumigraph, 20 rays", &models::lumigraph(ball(), 20), 1);
 }
 
 /// `cargo bench -- models` leaves the meshes out.

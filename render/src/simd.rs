@@ -37,7 +37,7 @@ impl Level {
             #[cfg(target_arch = "x86_64")]
             (Set::Avx2, std::arch::is_x86_feature_detected!("avx2")),
             #[cfg(target_arch = "x86_64")]
-            (Set::Avx512, is_x86_feature_detected_all()),
+            (Set::Avx512, has_avx512()),
             #[cfg(target_arch = "aarch64")]
             (Set::Neon, std::arch::is_aarch64_feature_detected!("neon")),
         ];
@@ -57,8 +57,11 @@ impl Level {
 }
 
 #[cfg(target_arch = "x86_64")]
-fn is_x86_feature_detected_all() -> bool {
-    std::arch::is_x86_feature_detected!("avx512f") && std::arch::is_x86_feature_detected!("avx512bw")
+fn has_avx512() -> bool {
+    // What narrower registers do best is done in those.
+    std::arch::is_x86_feature_detected!("avx2")
+        && std::arch::is_x86_feature_detected!("avx512f")
+        && std::arch::is_x86_feature_detected!("avx512bw")
 }
 
 /// Work that is worth compiling for wide registers. `run`, and what it calls, must be inlined to be.
@@ -107,7 +110,7 @@ impl Level {
     pub(crate) fn run(self, work: impl Work) {
         match self.0 {
             #[cfg(target_arch = "x86_64")]
-            // SAFETY: the level exists, so AVX2 was detected; what has AVX-512 has AVX2.
+            // SAFETY: the level exists, so AVX2 was detected; with AVX-512, too.
             #[allow(unsafe_code, reason = "calls into code compiled for instructions that were detected")]
             Set::Avx2 | Set::Avx512 => unsafe { run_avx2(work) },
             _ => work.run::<[i16; 8]>(),

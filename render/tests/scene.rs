@@ -1,11 +1,11 @@
 //! Models played from their 8-bit layers look as the reference draws their textures in `f32`.
 
-#[path = "support/closed_forms.rs"]
-mod closed_forms;
+#[path = "support/models.rs"]
+mod models;
 mod support;
 
 use capture::{Camera, Image};
-use closed_forms::{bumpy_ball, dyntex, lumigraph, still, vdtm};
+use models::{bumpy_ball, dyntex, lumigraph, still, vdtm};
 use nalgebra::{Point3, Rotation3, Vector3};
 use render::cpu::{Object, ScenePlayer};
 use render::material::Lighting;

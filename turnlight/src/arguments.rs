@@ -647,7 +647,7 @@ pub(crate) struct RenderArgs {
     /// Reduce the frames by this whole factor
     #[arg(long, value_name = "N", default_value = "1", value_parser = whole_factor)]
     pub(crate) downscale: usize,
-    /// Who draws; the picture is the same
+    /// Who draws; pictures differ by a level at most, nearly everywhere
     #[arg(long, value_enum, default_value = "auto")]
     pub(crate) renderer: RendererArg,
     #[command(flatten)]

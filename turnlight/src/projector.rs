@@ -23,7 +23,7 @@ pub enum Choice {
     Gpu,
 }
 
-/// Draws the frames of a scene; the picture is the same whoever draws it.
+/// Draws the frames of a scene; whoever draws it, the picture is the same within a level nearly everywhere.
 #[derive(Debug)]
 pub struct Projector<'a> {
     player: ScenePlayer<'a>,

@@ -6,6 +6,7 @@ use capture::{Aabb, Image};
 use nalgebra::{Point3, Quaternion, UnitQuaternion};
 use render::Pose;
 use serde::Deserialize;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 use texture::Model;
 
@@ -82,11 +83,15 @@ impl Scene {
             return Ok(Self::of(read_model(path)?));
         }
         let refused = |fault: String| Error::Failed(format!("{}: {fault}", path.display()));
-        let bytes = std::fs::metadata(path).map_err(|fault| refused(format!("{fault}; check the path")))?.len();
-        if bytes > MOST_BYTES {
-            return Err(refused(format!("{bytes} bytes are no scene; give a file of {MOST_BYTES} at most")));
+        let file = std::fs::File::open(path).map_err(|fault| refused(format!("{fault}; check the path")))?;
+        let mut text = String::new();
+        // Of a pipe the length is known at its end alone.
+        file.take(MOST_BYTES + 1)
+            .read_to_string(&mut text)
+            .map_err(|fault| refused(format!("{fault}; check the file")))?;
+        if text.len() as u64 > MOST_BYTES {
+            return Err(refused(format!("more than {MOST_BYTES} bytes are no scene; give a smaller file")));
         }
-        let text = std::fs::read_to_string(path).map_err(|fault| refused(format!("{fault}; check the file")))?;
         let keys: SceneKeys = serde_json::from_str(&text)
             .map_err(|fault| refused(format!("no scene ({fault}); docs/playback.md says what one holds")))?;
         if keys.objects.is_empty() || keys.objects.len() > MOST_OBJECTS {

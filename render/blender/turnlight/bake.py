@@ -18,15 +18,19 @@ def bake(context, held, folder):
     scene, image = context.scene, picture_of(held)
     folder.mkdir(parents=True, exist_ok=True)
     name = bpy.path.clean_name(held.name)
+    if scene.frame_start < 0:
+        raise RuntimeError("frames below 0 make no sequence; start the scene at 0 or later")
     now = scene.frame_current
-    for frame in range(scene.frame_start, scene.frame_end + 1):
-        scene.frame_set(frame)
-        depsgraph = context.evaluated_depsgraph_get()
-        playback.play(scene, depsgraph, playback.camera_eye(scene, depsgraph))
-        _write(image, folder / f"{name}_{frame:04}.png")
-    _wear(held, image, _sequence(folder / f"{name}_{scene.frame_start:04}.png"), scene)
-    del held[PICTURE]
-    scene.frame_set(now)
+    try:
+        for frame in range(scene.frame_start, scene.frame_end + 1):
+            scene.frame_set(frame)
+            depsgraph = context.evaluated_depsgraph_get()
+            playback.play(scene, depsgraph, playback.camera_eye(scene, depsgraph))
+            _write(image, folder / f"{name}_{frame:04}.png")
+        _wear(held, image, _sequence(folder / f"{name}_{scene.frame_start:04}.png"), scene)
+        del held[PICTURE]
+    finally:
+        scene.frame_set(now)
 
 
 def _write(image, path):

@@ -149,6 +149,9 @@ fn weights_that_no_one_means_are_bounded() {
         let layers = vec![layer(scale, 3.0 * scale); 40];
         weights.round(&[2.0; 40], &layers);
         assert_eq!(weights.pairs.len(), 20);
+        let signs: Vec<i16> = weights.pairs.iter().flatten().map(|g| g.signum()).collect();
+        let expected = if scale.is_finite() && scale.abs() > 1e-20 { scale.signum() as i16 } else { 0 };
+        assert!(signs.iter().all(|s| *s == expected), "{scale}: {signs:?}");
     }
     weights.round(&[1.0, 0.5, f32::NAN], &vec![layer(1.0, 0.0); 3]);
     assert_eq!((weights.pairs.clone(), weights.shift), (vec![[1 << 14, 1 << 13], [0, 0]], 14 - FIXED_PLACES));

@@ -57,7 +57,7 @@ impl Wanted {
             let last = count.saturating_sub(1);
             let first = (((low[k] - reach) / BLOCK as f64) as usize).min(last);
             let end = if high[k].is_nan() { last } else { (((high[k] + reach) / BLOCK as f64) as usize).min(last) };
-            first..(end + 1).min(count)
+            first.min(end)..(end + 1).min(count)
         };
         let across = self.size[0].div_ceil(BLOCK);
         for row in blocks(1) {

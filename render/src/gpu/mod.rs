@@ -9,7 +9,7 @@
 //!
 //! An appearance answers for the eye on the CPU ([`texture::FacetWeights::at`]), as for every renderer; the
 //! adapter does the rest. Where the adapter is itself a program on the CPU, our own blend is the faster one: its
-//! atlas is uploaded and the first pass left out ([`Blend`]). Either way the picture is the same.
+//! atlas is uploaded and the first pass left out ([`Blend`]). Either way the picture is the same, within a level nearly everywhere.
 //!
 //! *Limits*: textures and buffers as large as the adapter takes them, 1 GiB in all; a model beyond is refused
 //! ([`GpuError::TooLarge`]). A camera with a lens is refused, too: hardware draws straight edges, and a lens bends them. The
@@ -236,15 +236,18 @@ impl<'a> Renderer<'a> {
     /// Draws one frame to somebody else's target, and does not wait for it.
     ///
     /// # Errors
-    /// As [`Renderer::render`].
+    /// As [`Renderer::render`]; [`GpuError::Unsupported`] for a camera that sees nothing, too: the target is left as it is.
     pub fn draw(&mut self, shot: &Shot<'_>, target: &Target<'_>) -> Result<(), GpuError> {
         self.times = StageTimes::default();
         refuse_lens(shot.camera)?;
+        let (width, height) = frame_size(shot.camera);
+        if width == 0 || height == 0 || !is_usable(shot.camera) {
+            return Err(GpuError::Unsupported { what: "a camera that sees nothing".to_owned() });
+        }
         let device = self.device.clone();
         device.guarded(|| {
             self.prepare(shot)?;
             let start = Instant::now();
-            let (width, height) = frame_size(shot.camera);
             for tile in tiles([width, height], &shot.options) {
                 let mut encoder = self.encoder();
                 self.draw_tile(&mut encoder, &tile, shot, target, tile.origin)?;

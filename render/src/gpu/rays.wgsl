@@ -47,8 +47,9 @@ fn blend(@builtin(position) at: vec4<f32>) -> @location(0) vec4<f32> {
     }
     var threshold = penalties[BLENDED];
     if count <= BLENDED {
-        threshold = 1.01 * penalties[count - 1u] + 1e-12;
+        threshold = 1.01 * penalties[count - 1u];
     }
+    threshold += 1e-12;
     var sum = vec4(0.0);
     for (var i = 0u; i < min(count, BLENDED); i++) {
         let weight = max(1.0 - penalties[i] / threshold, 0.0) / max(penalties[i], 1e-6) + 1e-9;

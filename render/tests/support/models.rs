@@ -1,5 +1,8 @@
 //! Models in closed form: no fit, no noise.
 
+#![allow(dead_code, reason = "every test binary uses some of it")]
+#![allow(clippy::unwrap_used, reason = "a helper that fails fails its test")]
+
 use capture::Image;
 use geometry::{Mesh, TexturedMesh};
 use nalgebra::{Point2, Point3, Vector3};

@@ -3,12 +3,12 @@
 //! | part | an item | index bits | numbers, compact | full |
 //! |---|---|---|---|---|
 //! | P1 | `n_β` values of mean 1 | – | 8 bits of the row's largest | f32 |
-//! | P2, P3, P4, P6 | `n_α`, `n_θ`, `n_φ`, 1 entries | `⌈log₂ S⌉` of the book below | scale, 8 bits, logarithmic | f32 |
+//! | P2, P3, P4, P6 | `n_α`, `n_θ`, `n_φ`, 1 entries | `⌈log₂ S⌉` of the book below | scale, 6 bits, logarithmic | f32 |
 //! | M | one of P2, one of I2 | `⌈log₂ S₂⌉ + ⌈log₂ S_I2⌉` | – | – |
 //! | I2, I1 | `n_α`, `n_β` entries | `⌈log₂ S⌉` | – | – |
 //! | C | Cr, Cb | – | 16 bits each | f32 |
 //!
-//! Scales of range `R = c_max/c_min` are off by at most `ln R / 508` of themselves; code 0 is 0; a book whose
+//! Scales of range `R = c_max/c_min` are off by at most `ln R / 124` of themselves; code 0 is 0; a book whose
 //! scales are all equal stores one. From below upward each scale takes over what rounding did to its child,
 //! `⟨before, after⟩/⟨after, after⟩`. A single child needs no index, a single item of P4 no P6.
 

@@ -339,6 +339,7 @@ fn search_threshold(
     let distance =
         |found: f64| if found > high { OVER_BUDGET + (found / high).ln() } else { (low / found).ln().max(0.0) };
     let wanted = 0.5 * (low.ln() + high.ln());
+    let first = first.clamp(THRESHOLDS[0], THRESHOLDS[1]);
     let mut best = grow(first);
     let mut nearest = size(&best);
     report.objective.push(nearest);
