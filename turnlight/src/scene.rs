@@ -133,7 +133,11 @@ impl Scene {
     }
 }
 
-fn read_model(path: &Path) -> Result<Model, Error> {
+/// Reads a model.
+///
+/// # Errors
+/// Where the file is missing, or no model.
+pub fn read_model(path: &Path) -> Result<Model, Error> {
     let bytes =
         std::fs::read(path).map_err(|fault| Error::Failed(format!("{}: {fault}; check the path", path.display())))?;
     Ok(Model::from_glb(&bytes, path)?)

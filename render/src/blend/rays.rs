@@ -17,13 +17,10 @@ use geometry::atlas::PushPull;
 use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
 use texture::SurfaceTexels;
-use texture::appearance::Lumigraph;
+use texture::appearance::{Lumigraph, NO_RAY};
 
 /// Rays blended for one texel.
 const BLENDED: usize = 4;
-
-/// Where a texel has no ray.
-const NO_RAY: u16 = u16::MAX;
 
 /// One in the coordinates of a direction.
 const UNIT: f32 = 32767.0;

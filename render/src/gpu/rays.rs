@@ -8,10 +8,7 @@ use super::device::{Device, cover};
 use bytemuck::cast_slice;
 use nalgebra::Point3;
 use texture::SurfaceTexels;
-use texture::appearance::Lumigraph;
-
-/// What marks a slot without a ray.
-const NO_RAY: u16 = u16::MAX;
+use texture::appearance::{Lumigraph, NO_RAY};
 
 /// The rays on the adapter.
 #[derive(Debug)]

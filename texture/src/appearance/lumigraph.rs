@@ -20,8 +20,8 @@ use rayon::prelude::*;
 /// Rays blended for one texel.
 const BLENDED: usize = 4;
 
-/// No ray.
-pub(crate) const NO_RAY: u16 = u16::MAX;
+/// In place of a view: a texel has no more rays.
+pub const NO_RAY: u16 = u16::MAX;
 
 /// Rays of all texels.
 #[derive(Clone, Debug)]

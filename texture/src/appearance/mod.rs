@@ -5,4 +5,4 @@ pub(crate) mod lumigraph;
 pub(crate) mod static_texture;
 pub(crate) mod vdtm;
 
-pub use lumigraph::Lumigraph;
+pub use lumigraph::{Lumigraph, NO_RAY};

@@ -1,16 +1,15 @@
 //! `turnlight bench`
 
-use super::{check_extension, read_file};
+use super::check_extension;
 use crate::Answer;
 use crate::arguments::{BenchCommand, BenchPlaybackArgs};
 use serde_json::json;
-use std::path::Path;
 use turnlight::Error;
 use turnlight::bench::object::bumpy_ball;
 use turnlight::bench::playback::{PlaybackOptions, playback};
 use turnlight::output::write_file;
+use turnlight::scene::read_model;
 use turnlight::stages::{Observer, Stages};
-use turnlight::texture::Model;
 
 /// Runs where no number of objects is given.
 const OBJECTS: [usize; 2] = [1, 10];
@@ -38,8 +37,4 @@ fn time_playback(args: &BenchPlaybackArgs, observer: &dyn Observer) -> Result<An
         write_file(output, format!("{json:#}\n").as_bytes())?;
     }
     Ok(Answer { text, json })
-}
-
-fn read_model(path: &Path) -> Result<Model, Error> {
-    Ok(Model::from_glb(&read_file(path)?, path)?)
 }
