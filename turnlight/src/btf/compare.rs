@@ -186,7 +186,7 @@ pub fn text(comparison: &CodecComparison) -> String {
     }
     for d in &comparison.deltas {
         let [from, to] = d.bytes;
-        let range = format!("{from:.0} to {to:.0} bytes");
+        let range = format!("{from} to {to} bytes");
         let _ = writeln!(out, "{} over {}, {range}: {:+.3} RMSE, {:+.2} dB", d.codec, d.against, d.rmse, d.psnr_db);
     }
     out

@@ -21,7 +21,7 @@ pub struct Delta {
     /// How much higher its RMSE is, levels of 255.
     pub rmse: f64,
     /// From and to how many bytes.
-    pub bytes: [f64; 2],
+    pub bytes: [u64; 2],
 }
 
 /// All pairs of codecs that were run at two sizes or more and have sizes in common, in the order of the runs.
@@ -37,7 +37,13 @@ pub(super) fn deltas(runs: &[CodecRun]) -> Vec<Delta> {
     let delta = |(a, b): (&Curves, &Curves)| {
         let (psnr_db, [from, to]) = a.psnr.over(&b.psnr)?;
         let (rmse, _) = a.rmse.over(&b.rmse)?;
-        Some(Delta { codec: a.codec, against: b.codec, psnr_db, rmse, bytes: [from.exp(), to.exp()] })
+        Some(Delta {
+            codec: a.codec,
+            against: b.codec,
+            psnr_db,
+            rmse,
+            bytes: [from, to].map(|bytes| bytes.exp().round() as u64),
+        })
     };
     pairs.filter_map(delta).collect()
 }

@@ -240,9 +240,9 @@ fn leaving_components_out_costs_less_than_a_thousandth_of_the_likelihood() {
     assert!(evaluations < 36.0, "{evaluations} of 40 were evaluated");
 }
 
-/// The whole way beside plain EM, on 16 × 16 texels under 27 × 27 directions: minutes.
+/// Twenty rounds beside plain EM, on 16 × 16 texels under 27 × 27 directions.
 #[test]
-#[ignore = "minutes: plain EM goes over 187 thousand samples and 60 components in every round"]
+#[ignore = "half a minute: plain EM goes over 187 thousand samples and 60 components in every round"]
 fn on_a_tile_the_likelihood_is_that_of_plain_em() {
     let around = |thetas: [f64; 4], count: [usize; 4]| -> Vec<Vector3<f64>> {
         let ring =
@@ -255,17 +255,17 @@ fn on_a_tile_the_likelihood_is_that_of_plain_em() {
     let samples = all_samples(&grid, &pairs);
     let mut fast = start(&grid, &pairs, 60, &SHAPES[0], &FLOORS, 3);
     let mut plain = fast.clone();
+    let before = plain_round(&samples, &plain, &FLOORS).0;
     for _ in 0..20 {
         let found = expect(&grid, &Packed::new(&fast), all(&pairs), 14.0);
         fast = maximise(&grid, &fast, &found, &FLOORS);
         plain = plain_round(&samples, &plain, &FLOORS).1;
     }
     let (ours, theirs) = (plain_round(&samples, &fast, &FLOORS).0, plain_round(&samples, &plain, &FLOORS).0);
-    println!(
-        "log-likelihood of a sample: {ours}, by plain EM {theirs}, off by {:.5} %",
-        100.0 * (ours / theirs - 1.0).abs()
-    );
-    assert!((ours - theirs).abs() < 1e-3 * theirs.abs(), "{ours} {theirs}");
+    // Units shift a likelihood: what counts is how far it has risen.
+    let risen = theirs - before;
+    println!("a sample's log-likelihood rose by {risen}, plain; by {} less", theirs - ours);
+    assert!(risen > 0.1 && (ours - theirs).abs() < 1e-3 * risen, "{ours} {theirs} after {before}");
 }
 
 #[test]
