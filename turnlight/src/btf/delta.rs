@@ -29,7 +29,7 @@ pub(super) fn deltas(runs: &[CodecRun]) -> Vec<Delta> {
     let mut names: Vec<&'static str> = Vec::new();
     runs.iter().for_each(|run| {
         if !names.contains(&run.name) {
-            names.push(run.name)
+            names.push(run.name);
         }
     });
     let curves: Vec<Curves> = names.iter().filter_map(|&name| Curves::of(runs, name)).collect();
