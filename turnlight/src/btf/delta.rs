@@ -163,7 +163,7 @@ mod tests {
 
     #[test]
     fn parallel_curves_differ_by_their_distance() {
-        let bent = |shift: f64| Curve::new([0.0, 1.0, 2.0, 4.0].map(|x| [x, shift - (-x).exp()]).to_vec()).unwrap();
+        let bent = |shift: f64| Curve::new([0.0_f64, 1.0, 2.0, 4.0].map(|x| [x, shift - (-x).exp()]).to_vec()).unwrap();
         assert!((bent(3.25).over(&bent(1.0)).unwrap().0 - 2.25).abs() < 1e-12);
     }
 
