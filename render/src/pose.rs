@@ -1,6 +1,9 @@
 //! Where an object stands in a scene.
 
 use crate::material::{Light, Lighting};
+use capture::Aabb;
+#[cfg(feature = "gpu")]
+use capture::Camera;
 use nalgebra::{Matrix3, Point3, Vector3};
 
 /// From an object's coordinates to the world: `X_world = scale · rotation · X_object + translation`.
@@ -30,6 +33,23 @@ impl Pose {
     /// A point of the world, in the object's coordinates.
     pub fn to_object(&self, point: &Point3<f64>) -> Point3<f64> {
         Point3::from(self.rotation.transpose() * (point.coords - self.translation) / self.scale)
+    }
+
+    /// The corners of a box of the object, in the world.
+    pub fn corners(&self, aabb: &Aabb) -> [Point3<f64>; 8] {
+        let pick = |corner: usize, k: usize| if corner >> k & 1 == 0 { aabb.min[k] } else { aabb.max[k] };
+        std::array::from_fn(|corner| self.to_world(&[0, 1, 2].map(|k| pick(corner, k)).into()))
+    }
+
+    /// A camera as the object sees it: the same picture, depths and lengths in units of the object.
+    /// `X_c = R (s R_m X + t_m) + t = s (R R_m X + (R t_m + t) / s)`.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn camera(&self, world: &Camera) -> Camera {
+        Camera {
+            rotation: world.rotation * self.rotation,
+            translation: (world.rotation * self.translation + world.translation) / self.scale,
+            ..*world
+        }
     }
 
     /// The same light in the object's coordinates. Lamps come nearer as the object's unit grows: irradiance is kept.

@@ -3,8 +3,6 @@
 use crate::scene::Scene;
 use crate::{Error, playback};
 use capture::{Camera, Image};
-#[cfg(feature = "gpu")]
-use render::Pose;
 use render::RenderOptions;
 use render::cpu::ScenePlayer;
 #[cfg(feature = "gpu")]
@@ -26,25 +24,27 @@ pub enum Choice {
 /// Draws the frames of a scene; whoever draws it, the picture is the same within a level nearly everywhere.
 #[derive(Debug)]
 pub struct Projector<'a> {
-    player: ScenePlayer<'a>,
+    scene: &'a Scene,
+    coats: &'a [Option<Coats<'a>>],
+    options: RenderOptions,
+    /// The CPU's; made once it draws, for it lays out all the models' layers.
+    player: Option<ScenePlayer<'a>>,
     #[cfg(feature = "gpu")]
     hardware: Option<Hardware<'a>>,
     device: String,
     note: Option<String>,
 }
 
-/// Graphics hardware, with a model on it.
+/// Graphics hardware, with a scene on it.
 #[cfg(feature = "gpu")]
 #[derive(Debug)]
 struct Hardware<'a> {
     renderer: gpu::Renderer<'a>,
-    is_lit: bool,
     options: RenderOptions,
 }
 
 impl<'a> Projector<'a> {
-    /// A projector of `scene`, with the materials that were laid over its models. Graphics hardware draws one model
-    /// where its own coordinates are the world's; the CPU draws whatever else there is.
+    /// A projector of `scene`, with the materials that were laid over its models.
     ///
     /// # Errors
     /// [`Error::Arguments`] where graphics hardware is asked for in a build without.
@@ -61,7 +61,10 @@ impl<'a> Projector<'a> {
             ));
         }
         let projector = Self {
-            player: ScenePlayer::new(&playback::objects(scene, coats), options),
+            scene,
+            coats,
+            options,
+            player: None,
             #[cfg(feature = "gpu")]
             hardware: None,
             device: of_cpu(),
@@ -91,7 +94,12 @@ impl<'a> Projector<'a> {
         if let Some(frame) = self.frame_of_hardware(camera, lighting) {
             return frame;
         }
-        self.player.render(camera, lighting)
+        self.player().render(camera, lighting)
+    }
+
+    fn player(&mut self) -> &mut ScenePlayer<'a> {
+        let Self { scene, coats, options, .. } = *self;
+        self.player.get_or_insert_with(|| ScenePlayer::new(&playback::objects(scene, coats), options))
     }
 }
 
@@ -127,27 +135,18 @@ impl<'a> Hardware<'a> {
         options: RenderOptions,
         choice: Choice,
     ) -> Result<(Self, String), gpu::GpuError> {
-        let alone = match scene.objects[..] {
-            [object] if object.pose == Pose::default() => scene.models.get(object.model).map(|m| (object.model, m)),
-            _ => None,
-        };
-        let Some((at, model)) = alone else {
-            return Err(gpu::GpuError::Unsupported { what: "a scene of other than one model in its place".to_owned() });
-        };
         let device = gpu::Device::headless()?;
         if choice == Choice::Auto && device.is_software() {
             let fault = format!("{} is itself a program on the CPU", device.name());
             return Err(gpu::GpuError::NoAdapter { fault });
         }
-        let mut renderer = gpu::Renderer::new(&device, model)?;
-        let coats = coats.get(at).and_then(Option::as_ref);
-        coats.map_or(Ok(()), |coats| renderer.lay(coats))?;
-        Ok((Self { renderer, is_lit: coats.is_some(), options }, device.name().to_owned()))
+        let objects = playback::objects(scene, coats);
+        let renderer = gpu::Renderer::of_scene(&device, &objects, gpu::Blend::fastest(&device))?;
+        Ok((Self { renderer, options }, device.name().to_owned()))
     }
 
     fn frame(&mut self, camera: &Camera, lighting: &Lighting) -> Result<Image<[u8; 4]>, gpu::GpuError> {
-        let lighting = self.is_lit.then_some(lighting);
-        self.renderer.render(&gpu::Shot { camera, lighting, options: self.options })
+        self.renderer.render(&gpu::Shot { camera, lighting: Some(lighting), options: self.options })
     }
 }
 

@@ -3,7 +3,7 @@
 use crate::Error;
 use crate::panorama::read_panorama;
 use capture::{Aabb, Image};
-use nalgebra::{Point3, Quaternion, UnitQuaternion};
+use nalgebra::{Quaternion, UnitQuaternion};
 use render::Pose;
 use serde::Deserialize;
 use std::io::Read;
@@ -121,16 +121,14 @@ impl Scene {
 impl Scene {
     /// The box around all objects; `None` where there is no vertex.
     pub fn aabb(&self) -> Option<Aabb> {
-        let corners = self.objects.iter().filter_map(|placed| {
-            let aabb = self.models[placed.model].mesh.mesh.aabb()?;
-            let pick = move |corner: usize, k: usize| if corner >> k & 1 == 0 { aabb.min[k] } else { aabb.max[k] };
-            Some((0..8).map(move |corner| {
-                placed.pose.to_world(&Point3::new(pick(corner, 0), pick(corner, 1), pick(corner, 2)))
-            }))
-        });
-        let boxes = corners.flatten().map(|p| Aabb { min: p, max: p });
-        boxes.reduce(|a, b| Aabb { min: a.min.inf(&b.min), max: a.max.sup(&b.max) })
+        aabb_of(self.objects.iter().map(|placed| (&self.models[placed.model], &placed.pose)))
     }
+}
+
+/// The box around the posed boxes of models; `None` where there is no vertex.
+pub fn aabb_of<'a>(objects: impl IntoIterator<Item = (&'a Model, &'a Pose)>) -> Option<Aabb> {
+    let corners = objects.into_iter().filter_map(|(model, pose)| Some(pose.corners(&model.mesh.mesh.aabb()?)));
+    Aabb::around(corners.flatten())
 }
 
 /// Reads a model.
@@ -163,6 +161,7 @@ fn pose(keys: &ObjectKeys) -> Result<Pose, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nalgebra::Point3;
 
     fn fault(json: &str) -> String {
         let folder = tempfile::tempdir().unwrap();

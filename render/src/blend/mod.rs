@@ -34,6 +34,7 @@ use nalgebra::Point3;
 use pack::{Line, Packed, VALUES};
 use rayon::prelude::*;
 use rays::Rays;
+use std::sync::Arc;
 use texture::{Appearance, Layers, Model};
 use wanted::{BLOCK, BLOCK_LEVEL};
 use weights::Weights;
@@ -61,7 +62,8 @@ enum Source<'a> {
 #[derive(Debug)]
 struct LayerSource<'a> {
     layers: &'a Layers,
-    packed: Packed,
+    /// Shared by objects of one model.
+    packed: Arc<Packed>,
     facets: Vec<FacetState>,
     level: Level,
 }
@@ -106,14 +108,28 @@ impl<'a> Atlas<'a> {
     pub(crate) fn with_level(model: &'a Model, level: Level) -> Self {
         let (source, [width, height]) = match &model.appearance {
             Appearance::Layers(layers) => {
-                let facets = vec![FacetState::default(); layers.facets.len()];
                 let size = [layers.facet_of_texel.width(), layers.facet_of_texel.height()];
-                (Source::Layers(LayerSource { layers, packed: Packed::new(layers), facets, level }), size)
+                (Source::Layers(LayerSource::new(layers, Arc::new(Packed::new(layers)), level)), size)
             }
             Appearance::Lumigraph(rays, surface) => {
                 (Source::Rays(Box::new(Rays::new(rays, surface, level))), surface.size)
             }
         };
+        Self::empty(source, [width, height])
+    }
+
+    /// Another texture of the same model, as for an object that stands elsewhere; what was laid out is shared.
+    pub fn another(&self) -> Self {
+        let source = match &self.source {
+            Source::Layers(LayerSource { layers, packed, level, .. }) => {
+                Source::Layers(LayerSource::new(layers, Arc::clone(packed), *level))
+            }
+            Source::Rays(rays) => Source::Rays(Box::new(rays.another())),
+        };
+        Self::empty(source, self.size())
+    }
+
+    fn empty(source: Source<'a>, [width, height]: [usize; 2]) -> Self {
         let side = |length: usize, level: usize| length.div_ceil(1 << level);
         let empty = |level: usize| Image::filled(side(width, level), side(height, level), [0; 3]);
         Self {
@@ -226,6 +242,12 @@ impl Source<'_> {
             }
         }
         bytes
+    }
+}
+
+impl<'a> LayerSource<'a> {
+    fn new(layers: &'a Layers, packed: Arc<Packed>, level: Level) -> Self {
+        Self { layers, packed, facets: vec![FacetState::default(); layers.facets.len()], level }
     }
 }
 

@@ -16,6 +16,7 @@ use capture::Image;
 use geometry::atlas::PushPull;
 use nalgebra::{Point3, Vector3};
 use rayon::prelude::*;
+use std::sync::Arc;
 use texture::SurfaceTexels;
 use texture::appearance::{Lumigraph, NO_RAY};
 
@@ -28,9 +29,17 @@ const UNIT: f32 = 32767.0;
 /// Penalty of a ray that is not there: beyond any chord.
 const NOWHERE: f32 = 1e9;
 
-/// All rays, ready to be asked.
+/// All rays, ready to be asked, and what they last answered.
 #[derive(Debug)]
 pub(super) struct Rays<'a> {
+    laid: Arc<Laid<'a>>,
+    /// As last seen.
+    seen: Image<[f32; 3]>,
+}
+
+/// What does not depend on the eye: objects of one model share it.
+#[derive(Debug)]
+struct Laid<'a> {
     rays: &'a Lumigraph,
     surface: &'a SurfaceTexels,
     /// Towards the views, coordinate by coordinate, per texel: 3 × rays.
@@ -40,8 +49,6 @@ pub(super) struct Rays<'a> {
     /// Mean colours of texels with rays.
     means: Image<[f32; 3]>,
     fill: PushPull,
-    /// As last seen.
-    seen: Image<[f32; 3]>,
     level: Level,
 }
 
@@ -59,20 +66,25 @@ impl<'a> Rays<'a> {
             }
         }
         let fill = PushPull::new(surface.size, &known);
-        Self { rays, surface, directions, rows, seen: means.clone(), means, fill, level }
+        let seen = means.clone();
+        Self { laid: Arc::new(Laid { rays, surface, directions, rows, means, fill, level }), seen }
+    }
+
+    /// The same rays for another eye.
+    pub(super) fn another(&self) -> Self {
+        Self { laid: Arc::clone(&self.laid), seen: self.laid.means.clone() }
     }
 
     /// Blends what is wanted.
     pub(super) fn blend(&mut self, eye: &Point3<f64>, wanted: &Wanted) {
-        let width = self.surface.size[0].max(1);
-        let mut seen = std::mem::replace(&mut self.seen, Image::filled(0, 0, [0.0; 3]));
-        let rows = seen.pixels_mut().par_chunks_mut(width).zip(self.means.pixels().par_chunks(width)).enumerate();
+        let Self { laid, seen } = self;
+        let width = laid.surface.size[0].max(1);
+        let rows = seen.pixels_mut().par_chunks_mut(width).zip(laid.means.pixels().par_chunks(width)).enumerate();
         rows.for_each(|(y, (row, means))| {
             row.copy_from_slice(means);
-            self.level.run(Row { rays: self, eye, wanted, y, texels: row });
+            laid.level.run(Row { rays: laid, eye, wanted, y, texels: row });
         });
-        self.fill.apply(seen.pixels_mut().as_flattened_mut(), 3);
-        self.seen = seen;
+        laid.fill.apply(seen.pixels_mut().as_flattened_mut(), 3);
     }
 
     /// Puts a block where it is looked up; how many bytes were read for it.
@@ -84,7 +96,7 @@ impl<'a> Rays<'a> {
             }
         }
         let bytes_of_ray = 3 + size_of::<u16>() + 3 * size_of::<i16>();
-        (columns.len() * rows.texels.len() / rows.width * self.rays.rays * bytes_of_ray) as u64
+        (columns.len() * rows.texels.len() / rows.width * self.laid.rays.rays * bytes_of_ray) as u64
     }
 }
 
@@ -112,7 +124,7 @@ fn mean(rays: &Lumigraph, texel: usize) -> Option<[f32; 3]> {
 
 /// The wanted texels of a row.
 struct Row<'a> {
-    rays: &'a Rays<'a>,
+    rays: &'a Laid<'a>,
     eye: &'a Point3<f64>,
     wanted: &'a Wanted,
     y: usize,
@@ -139,7 +151,7 @@ impl Work for Row<'_> {
     }
 }
 
-impl Rays<'_> {
+impl Laid<'_> {
     /// Squared penalties of a texel's rays.
     #[inline(always)]
     fn penalise(&self, texel: usize, to_eye: &Vector3<f32>, penalties: &mut [f32]) {

@@ -28,6 +28,8 @@ mod setup;
 mod shade;
 mod visibility;
 
+#[cfg(feature = "gpu")]
+pub(crate) use scene::distinct;
 pub use scene::{Object, ScenePlayer};
 
 use crate::blend::Wanted;

@@ -48,15 +48,17 @@ impl<'a> Object<'a> {
 }
 
 impl<'a> ScenePlayer<'a> {
-    /// A player of `objects`.
+    /// A player of `objects`. Those of one model share what it holds; each has a texture of its own.
     pub fn new(objects: &[Object<'a>], options: RenderOptions) -> Self {
-        let actor = |object: &Object<'a>| {
-            let atlas = Atlas::new(object.model);
+        let (models, which) = distinct(objects);
+        let atlases: Vec<Atlas<'a>> = models.par_iter().map(|model| Atlas::new(model)).collect();
+        let actor = |(object, model): (&Object<'a>, usize)| {
+            let atlas = atlases[model].another();
             let wanted = atlas.wanted();
             let Object { model, pose, coats } = *object;
             Actor { mesh: &model.mesh, pose, coats, atlas, wanted, lighting: Lighting::default() }
         };
-        Self { actors: objects.par_iter().map(actor).collect(), canvas: Canvas::new(options) }
+        Self { actors: objects.iter().zip(which).map(actor).collect(), canvas: Canvas::new(options) }
     }
 
     /// How long the stages of the last frame took.
@@ -91,6 +93,19 @@ impl<'a> ScenePlayer<'a> {
             looks.map(|(atlas, actor)| actor.look(atlas, &actor.pose.to_object(&eye))).collect()
         });
     }
+}
+
+/// The models of some objects, each once, and of each object which one it is.
+pub(crate) fn distinct<'a>(objects: &[Object<'a>]) -> (Vec<&'a Model>, Vec<usize>) {
+    let mut models: Vec<&'a Model> = Vec::new();
+    let which = objects.iter().map(|object| {
+        models.iter().position(|model| std::ptr::eq(*model, object.model)).unwrap_or_else(|| {
+            models.push(object.model);
+            models.len() - 1
+        })
+    });
+    let which = which.collect();
+    (models, which)
 }
 
 /// An actor but for its atlas.

@@ -32,8 +32,6 @@ impl Atlas {
         let limit = u64::from(device.limits().max_texture_dimension_2d);
         let padded = [width, height].map(|side| side.max(1).next_power_of_two() as u64);
         device.check("texels along a side of the atlas", padded[0].max(padded[1]), limit)?;
-        let bytes = 8 * padded[0] * padded[1] * 4 / 3;
-        device.check_bytes(bytes)?;
         let (size, padded) = ([width.max(1) as u32, height.max(1) as u32], padded.map(|side| side as u32));
         let count = top_level(width, height) as u32 + 1;
         let usage = wgpu::TextureUsages::COPY_DST
@@ -75,14 +73,19 @@ impl Atlas {
         self.texture.create_view(&wgpu::TextureViewDescriptor::default())
     }
 
-    /// Fills level 0 with an atlas of this size.
-    pub(super) fn upload(&mut self, device: &Device, atlas: &Image<[f32; 3]>) {
+    /// Fills level 0 with an atlas of this size, of texels that are `scale` of a level each; one without texels stays black.
+    pub(super) fn upload<T: Copy + Into<f32> + Sync>(&mut self, device: &Device, atlas: &Image<[T; 3]>, scale: f32) {
+        if atlas.pixels().is_empty() {
+            return;
+        }
         self.texels.resize(4 * atlas.pixels().len(), f16::ONE);
-        let rows =
-            self.texels.par_chunks_mut(4 * atlas.width().max(1)).zip(atlas.pixels().par_chunks(atlas.width().max(1)));
+        let rows = self.texels.par_chunks_mut(4 * atlas.width()).zip(atlas.pixels().par_chunks(atlas.width()));
         rows.for_each_init(Vec::new, |padded: &mut Vec<f32>, (out, row)| {
             padded.clear();
-            padded.extend(row.iter().flat_map(|&[r, g, b]| [r, g, b, 1.0]));
+            padded.extend(row.iter().flat_map(|texel| {
+                let [r, g, b] = texel.map(|v| scale * v.into());
+                [r, g, b, 1.0]
+            }));
             out.convert_from_f32_slice(padded);
         });
         device.write(&self.texture, 0, self.size, bytemuck::cast_slice(self.texels.as_slice().reinterpret_cast()));
@@ -95,6 +98,12 @@ impl Atlas {
             cover(encoder, &self.halve, bindings, target, ([0, 0], at_level(self.size, level)));
         }
     }
+}
+
+/// Bytes of an atlas of this size.
+pub(super) fn bytes(size: [usize; 2]) -> u64 {
+    let [width, height] = size.map(|side| side.max(1).next_power_of_two() as u64);
+    8 * width * height * 4 / 3
 }
 
 /// Texels of a level, rounded up.

@@ -4,7 +4,7 @@ use super::GpuError;
 use pollster::block_on;
 use wgpu::util::DeviceExt;
 
-/// Bytes a model may take on the adapter: nothing tells how much memory there is.
+/// Bytes all that is drawn may take on the adapter: nothing tells how much memory there is.
 const MOST_BYTES: u64 = 1 << 30;
 
 /// What draws. Cheap to clone.
@@ -63,6 +63,10 @@ impl Device {
 
     pub(super) fn limits(&self) -> wgpu::Limits {
         self.device.limits()
+    }
+
+    pub(super) fn encoder(&self) -> wgpu::CommandEncoder {
+        self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default())
     }
 
     /// Waits until all that was submitted is done.

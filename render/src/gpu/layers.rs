@@ -15,6 +15,10 @@ use texture::{Layer, Layers};
 #[derive(Debug)]
 pub(super) struct LayerBlend<'a> {
     layers: &'a Layers,
+    /// Layers, and facets of texels.
+    textures: [wgpu::TextureView; 2],
+    /// Texels of each facet.
+    areas: Vec<u64>,
     /// Per facet: what `weights` in `layers.wgsl` says.
     entries: Vec<[f32; 2]>,
     weights: wgpu::Buffer,
@@ -28,7 +32,6 @@ impl<'a> LayerBlend<'a> {
         let size = [facets.width() as u32, facets.height() as u32];
         let count = layers.layers.len().max(1);
         device.check("layers", count as u64, u64::from(device.limits().max_texture_array_layers))?;
-        device.check_bytes(4 * facets.pixels().len() as u64 * count as u64)?;
         let usage = wgpu::TextureUsages::COPY_DST | wgpu::TextureUsages::TEXTURE_BINDING;
         let array = device.texture(size, [count as u32, 1], wgpu::TextureFormat::Rgba8Unorm, usage);
         for (k, layer) in (0..).zip(&layers.layers) {
@@ -37,17 +40,34 @@ impl<'a> LayerBlend<'a> {
         }
         let map = device.texture(size, [1, 1], wgpu::TextureFormat::R16Uint, usage);
         device.write(&map, 0, size, cast_slice(facets.pixels()));
-        let row = layers.layers.len() as u32 + 1;
-        let weights = device.buffer(&vec![0; 8 * row as usize * layers.facets.len()], wgpu::BufferUsages::STORAGE)?;
-        let row = device.buffer(cast_slice(&[row, 0, 0, 0]), wgpu::BufferUsages::UNIFORM)?;
         let pipeline = device.covering(include_str!("layers.wgsl"), "blend", FORMAT);
         let dimension = Some(wgpu::TextureViewDimension::D2Array);
         let array = array.create_view(&wgpu::TextureViewDescriptor { dimension, ..Default::default() });
         let map = map.create_view(&wgpu::TextureViewDescriptor::default());
-        let textures = [&array, &map].map(wgpu::BindingResource::TextureView);
-        let [array, map] = textures;
+        let mut areas = vec![0; layers.facets.len()];
+        for facet in facets.pixels() {
+            areas.get_mut(usize::from(*facet)).into_iter().for_each(|area| *area += 1);
+        }
+        Self::bound(device, layers, ([array, map], areas), pipeline)
+    }
+
+    /// The same layers for another eye.
+    pub(super) fn another(&self, device: &Device) -> Result<Self, GpuError> {
+        Self::bound(device, self.layers, (self.textures.clone(), self.areas.clone()), self.pipeline.clone())
+    }
+
+    fn bound(
+        device: &Device,
+        layers: &'a Layers,
+        (textures, areas): ([wgpu::TextureView; 2], Vec<u64>),
+        pipeline: wgpu::RenderPipeline,
+    ) -> Result<Self, GpuError> {
+        let row = layers.layers.len() as u32 + 1;
+        let weights = device.buffer(&vec![0; 8 * row as usize * layers.facets.len()], wgpu::BufferUsages::STORAGE)?;
+        let row = device.buffer(cast_slice(&[row, 0, 0, 0]), wgpu::BufferUsages::UNIFORM)?;
+        let [array, map] = textures.each_ref().map(wgpu::BindingResource::TextureView);
         let bindings = device.bind(&pipeline, 0, &[array, map, weights.as_entire_binding(), row.as_entire_binding()]);
-        Ok(Self { layers, entries: Vec::new(), weights, pipeline, bindings })
+        Ok(Self { layers, textures, areas, entries: Vec::new(), weights, pipeline, bindings })
     }
 
     /// Takes the weights for an eye to the adapter; false where they are what they were.
@@ -64,11 +84,27 @@ impl<'a> LayerBlend<'a> {
         true
     }
 
+    /// Takes nothing on the adapter for what it is.
+    pub(super) fn forget(&mut self) {
+        self.entries.clear();
+    }
+
+    /// Bytes that a blend with the present weights reads.
+    pub(super) fn read(&self) -> u64 {
+        let rows = self.entries.chunks(self.layers.layers.len() + 1).zip(&self.areas);
+        rows.map(|(row, area)| 4 * row[0][1] as u64 * area).sum()
+    }
+
     /// Blends them into level 0 of the atlas.
     pub(super) fn blend(&self, encoder: &mut wgpu::CommandEncoder, atlas: &Atlas) {
         let target = (atlas.finest(), wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT));
         cover(encoder, &self.pipeline, &self.bindings, target, ([0, 0], atlas.size()));
     }
+}
+
+/// Bytes that layers take: four a texel and layer, two a texel for its facet.
+pub(super) fn bytes(layers: &Layers) -> u64 {
+    layers.facet_of_texel.pixels().len() as u64 * (4 * layers.layers.len().max(1) as u64 + 2)
 }
 
 /// What is not zero: a texel's value is bias + Σ gain · texel.

@@ -11,11 +11,12 @@
 //! adapter does the rest. Where the adapter is itself a program on the CPU, our own blend is the faster one: its
 //! atlas is uploaded and the first pass left out ([`Blend`]). Either way the picture is the same, within a level nearly everywhere.
 //!
-//! *Limits*: textures and buffers as large as the adapter takes them, 1 GiB in all; a model beyond is refused
+//! *Limits*: textures and buffers as large as the adapter takes them, 1 GiB of textures in all; a scene beyond is refused
 //! ([`GpuError::TooLarge`]). A camera with a lens is refused, too: hardware draws straight edges, and a lens bends them. The
 //! CPU plays what is refused. Which of two faces a sub-sample on their common edge, or within 1/256 of its spacing
 //! of a silhouette, belongs to is the hardware's choice.
 
+mod actor;
 mod atlas;
 mod device;
 mod error;
@@ -31,20 +32,16 @@ pub use error::GpuError;
 /// The version whose devices and views are taken.
 pub use wgpu;
 
+use crate::cpu::{Object, distinct};
 use crate::material::{Coats, Lighting};
 use crate::resolve::Accumulator;
 use crate::{RenderOptions, frame_size, is_usable};
-use atlas::Atlas;
+use actor::Actor;
 use capture::{Camera, Image};
 use geometry::TexturedMesh;
-use layers::LayerBlend;
-use material::Dress;
-use nalgebra::Point3;
-use rays::RayBlend;
 use readback::Readback;
 use std::time::{Duration, Instant};
-use surface::Surface;
-use texture::{Appearance, Method, Model};
+use texture::Model;
 use tiles::{Canvas, Tile, tiles};
 
 /// Who blends the layers of a model.
@@ -89,30 +86,21 @@ pub struct Shot<'a> {
     pub options: RenderOptions,
 }
 
-/// Plays one model, or one mesh with atlases from elsewhere.
+/// Plays the objects of a scene, or one mesh with atlases from elsewhere.
 #[derive(Debug)]
 pub struct Renderer<'a> {
     device: Device,
-    surface: Surface,
-    atlas: Atlas,
-    bindings: wgpu::BindGroup,
-    source: Source<'a>,
-    dress: Option<Dress>,
-    /// The eye the atlas is for.
-    seen: Option<Point3<f64>>,
+    actors: Vec<Actor<'a>>,
     canvas: Option<Canvas>,
     readback: Option<Readback>,
     times: StageTimes,
 }
 
-/// Where the atlas comes from.
-#[derive(Debug)]
-enum Source<'a> {
-    /// [`Renderer::set_atlas`].
-    Given,
-    Blended(&'a Model),
-    Layers(LayerBlend<'a>),
-    Rays(Box<RayBlend>),
+impl Blend {
+    /// What is faster on a device.
+    pub fn fastest(device: &Device) -> Self {
+        if device.is_software() { Self::Cpu } else { Self::Adapter }
+    }
 }
 
 impl<'a> Renderer<'a> {
@@ -121,8 +109,7 @@ impl<'a> Renderer<'a> {
     /// # Errors
     /// [`GpuError::TooLarge`] where the model does not fit the adapter, [`GpuError::Driver`] where the driver fails.
     pub fn new(device: &Device, model: &'a Model) -> Result<Self, GpuError> {
-        let blend = if device.is_software() { Blend::Cpu } else { Blend::Adapter };
-        Self::with_blend(device, model, blend)
+        Self::with_blend(device, model, Blend::fastest(device))
     }
 
     /// The same with layers blended by whom one likes.
@@ -130,19 +117,28 @@ impl<'a> Renderer<'a> {
     /// # Errors
     /// As [`Renderer::new`].
     pub fn with_blend(device: &Device, model: &'a Model, blend: Blend) -> Result<Self, GpuError> {
-        let size = match &model.appearance {
-            Appearance::Layers(layers) => [layers.facet_of_texel.width(), layers.facet_of_texel.height()],
-            Appearance::Lumigraph(_, surface) => surface.size,
-        };
-        let mut renderer = Self::sized(device, &model.mesh, size)?;
-        renderer.source = device.guarded(|| {
-            Ok(match (blend, &model.appearance) {
-                (Blend::Cpu, _) => Source::Blended(model),
-                (Blend::Adapter, Appearance::Layers(layers)) => Source::Layers(LayerBlend::new(device, layers)?),
-                (Blend::Adapter, Appearance::Lumigraph(rays, texels)) => {
-                    Source::Rays(Box::new(RayBlend::new(device, rays, texels, renderer.surface.middle())?))
-                }
-            })
+        Self::of_scene(device, &[Object::new(model)], blend)
+    }
+
+    /// A renderer of several objects, nearest in front. Those of one model share what it holds; each has a texture of its
+    /// own.
+    ///
+    /// # Errors
+    /// As [`Renderer::new`], [`GpuError::TooLarge`] where the objects together do not fit; [`GpuError::Unsupported`] for
+    /// coats with a codec without a shader.
+    pub fn of_scene(device: &Device, objects: &[Object<'a>], blend: Blend) -> Result<Self, GpuError> {
+        let (models, which) = distinct(objects);
+        let bytes: Vec<[u64; 2]> = models.iter().map(|model| actor::bytes(model, blend)).collect();
+        let own = which.iter().map(|&model| bytes[model][1]);
+        device.check_bytes(bytes.iter().map(|[shared, _]| *shared).chain(own).sum())?;
+        let mut renderer = Self::empty(device);
+        device.guarded(|| {
+            for (k, object) in objects.iter().enumerate() {
+                let kin = which[..k].iter().position(|model| *model == which[k]);
+                let actor = Actor::of_object(device, object, blend, kin.map(|kin| &renderer.actors[kin]))?;
+                renderer.actors.push(actor);
+            }
+            Ok(())
         })?;
         Ok(renderer)
     }
@@ -152,26 +148,14 @@ impl<'a> Renderer<'a> {
     /// # Errors
     /// As [`Renderer::new`].
     pub fn of_mesh(device: &Device, mesh: &TexturedMesh) -> Result<Self, GpuError> {
-        Self::sized(device, mesh, mesh.atlas_size)
+        device.check_bytes(atlas::bytes(mesh.atlas_size))?;
+        let actor = device.guarded(|| Actor::of_mesh(device, mesh, mesh.atlas_size))?;
+        Ok(Self { actors: vec![actor], ..Self::empty(device) })
     }
 
-    fn sized(device: &Device, mesh: &TexturedMesh, atlas_size: [usize; 2]) -> Result<Self, GpuError> {
-        device.guarded(|| {
-            let (surface, atlas) = (Surface::new(device, mesh)?, Atlas::new(device, atlas_size)?);
-            let bindings = surface.bind(device, &atlas);
-            Ok(Self {
-                device: device.clone(),
-                surface,
-                atlas,
-                bindings,
-                source: Source::Given,
-                dress: None,
-                seen: None,
-                canvas: None,
-                readback: None,
-                times: StageTimes::default(),
-            })
-        })
+    fn empty(device: &Device) -> Self {
+        let times = StageTimes::default();
+        Self { device: device.clone(), actors: Vec::new(), canvas: None, readback: None, times }
     }
 
     /// How long the stages of the last frame took.
@@ -179,31 +163,29 @@ impl<'a> Renderer<'a> {
         self.times
     }
 
-    /// Shows `atlas` (encoded 0..=255, unclamped) from now on, instead of the model's own.
+    /// Bytes of layers and rays that the last frame read: none where weights were what they had been.
+    pub fn bytes(&self) -> u64 {
+        self.actors.iter().map(Actor::bytes).sum()
+    }
+
+    /// Shows `atlas` (encoded 0..=255, unclamped) on the first object from now on, instead of the model's own; black
+    /// where it has no texels.
     ///
     /// # Errors
     /// As [`Renderer::new`].
     pub fn set_atlas(&mut self, atlas: &Image<[f32; 3]>) -> Result<(), GpuError> {
-        let device = self.device.clone();
-        device.guarded(|| {
-            if self.atlas.size() != [atlas.width().max(1), atlas.height().max(1)].map(|side| side as u32) {
-                self.atlas = Atlas::new(&device, [atlas.width(), atlas.height()])?;
-                self.bindings = self.surface.bind(&device, &self.atlas);
-            }
-            self.atlas.upload(&device, atlas);
-            (self.source, self.seen) = (Source::Given, None);
-            Ok(())
-        })
+        let (device, first) = (&self.device, self.actors.first_mut());
+        device.guarded(|| first.map_or(Ok(()), |actor| actor.set_atlas(device, atlas)))
     }
 
-    /// Lays materials over the mesh, in place of others: what `lighting` shines on from now on. Without lighting the
-    /// atlas shows everywhere.
+    /// Lays materials over the mesh of the first object, in place of others: what `lighting` shines on from now on.
+    /// Without lighting the atlas shows everywhere.
     ///
     /// # Errors
     /// [`GpuError::Unsupported`] for a codec without a shader; as [`Renderer::new`].
     pub fn lay(&mut self, coats: &Coats<'_>) -> Result<(), GpuError> {
-        self.dress = Some(self.device.guarded(|| Dress::new(&self.device, &self.surface, coats))?);
-        Ok(())
+        let (device, first) = (&self.device, self.actors.first_mut());
+        device.guarded(|| first.map_or(Ok(()), |actor| actor.lay(device, coats)))
     }
 
     /// Draws one frame: RGBA, 8 bit encoded, not premultiplied, alpha the share of covered sub-samples; the contract of
@@ -219,14 +201,13 @@ impl<'a> Renderer<'a> {
             return Ok(frame);
         }
         refuse_lens(shot.camera)?;
-        let device = self.device.clone();
-        device.guarded(|| {
+        self.attempt(|renderer| {
             let start = Instant::now();
-            self.prepare(shot)?;
-            device.wait()?;
-            self.times.atlas = start.elapsed() - self.times.weights;
+            renderer.prepare(shot)?;
+            renderer.device.wait()?;
+            renderer.times.atlas = start.elapsed().saturating_sub(renderer.times.weights);
             for tile in tiles([width, height], &shot.options) {
-                self.read_tile(&tile, shot, &mut frame)?;
+                renderer.read_tile(&tile, shot, &mut frame)?;
             }
             Ok(())
         })?;
@@ -244,68 +225,34 @@ impl<'a> Renderer<'a> {
         if width == 0 || height == 0 || !is_usable(shot.camera) {
             return Err(GpuError::Unsupported { what: "a camera that sees nothing".to_owned() });
         }
-        let device = self.device.clone();
-        device.guarded(|| {
-            self.prepare(shot)?;
+        self.attempt(|renderer| {
+            renderer.prepare(shot)?;
             let start = Instant::now();
             for tile in tiles([width, height], &shot.options) {
-                let mut encoder = self.encoder();
-                self.draw_tile(&mut encoder, &tile, shot, target, tile.origin)?;
-                device.queue().submit([encoder.finish()]);
+                let mut encoder = renderer.device.encoder();
+                renderer.draw_tile(&mut encoder, &tile, shot, target, tile.origin)?;
+                renderer.device.queue().submit([encoder.finish()]);
             }
-            self.times.drawing = start.elapsed();
+            renderer.times.drawing = start.elapsed();
             Ok(())
         })
     }
 
-    /// Brings the light and the atlas to what the camera sees.
+    /// Draws; after a fault, which may have come at any time before it was heard of, nothing on the adapter is taken for
+    /// what it should be.
+    fn attempt(&mut self, work: impl FnOnce(&mut Self) -> Result<(), GpuError>) -> Result<(), GpuError> {
+        let device = self.device.clone();
+        let done = device.guarded(|| work(self));
+        if done.is_err() {
+            self.actors.iter_mut().for_each(Actor::forget);
+        }
+        done
+    }
+
+    /// Brings the lights and the atlases to what the camera sees.
     fn prepare(&mut self, shot: &Shot<'_>) -> Result<(), GpuError> {
-        if let (Some(dress), Some(lighting)) = (&self.dress, shot.lighting) {
-            dress.light(&self.device, lighting, &self.surface.middle())?;
-        }
-        let eye = shot.camera.center();
-        if self.is_stale(&eye) {
-            self.blend(&eye);
-        }
-        Ok(())
-    }
-
-    /// Brings the atlas to what `eye` sees.
-    fn blend(&mut self, eye: &Point3<f64>) {
-        self.seen = Some(*eye);
-        let start = Instant::now();
-        let mut encoder = self.encoder();
-        match &mut self.source {
-            Source::Given => {}
-            Source::Blended(model) => {
-                let atlas = model.atlas(eye);
-                self.times.weights = start.elapsed();
-                self.atlas.upload(&self.device, &atlas);
-            }
-            Source::Layers(layers) => {
-                if !layers.weigh(&self.device, eye) {
-                    return;
-                }
-                self.times.weights = start.elapsed();
-                layers.blend(&mut encoder, &self.atlas);
-            }
-            Source::Rays(rays) => {
-                rays.look(&self.device, eye);
-                rays.blend(&mut encoder, &self.atlas);
-            }
-        }
-        self.atlas.reduce(&mut encoder);
-        self.device.queue().submit([encoder.finish()]);
-        self.times.atlas = start.elapsed() - self.times.weights;
-    }
-
-    fn is_stale(&self, eye: &Point3<f64>) -> bool {
-        match (&self.source, &self.seen) {
-            (_, None) => true,
-            (Source::Given, _) => false,
-            (Source::Blended(model), _) if model.method == Method::Static => false,
-            (_, Some(seen)) => seen != eye,
-        }
+        let Self { device, actors, times, .. } = self;
+        actors.iter_mut().try_for_each(|actor| actor.prepare(device, shot, times))
     }
 
     /// Draws a tile to our own target, and reads it.
@@ -316,7 +263,7 @@ impl<'a> Renderer<'a> {
             Some(kept) if kept.fits(size) => kept,
             _ => Readback::new(&self.device, size),
         };
-        let mut encoder = self.encoder();
+        let mut encoder = self.device.encoder();
         let target = Target { view: readback.target(), format: readback::FORMAT };
         self.draw_tile(&mut encoder, tile, shot, &target, [0, 0])?;
         readback.copy(&mut encoder);
@@ -343,21 +290,15 @@ impl<'a> Renderer<'a> {
             Some(kept) if kept.fits(target.format) => kept,
             _ => Canvas::new(&self.device, target.format)?,
         };
-        self.surface.look(&self.device, shot.camera, &shot.options, tile, &self.atlas);
-        let dress = self.dress.as_ref().filter(|_| shot.lighting.is_some());
+        let nearest = self.actors.iter().map(Actor::nearest).filter(|n| *n > 0.0).fold(f64::INFINITY, f64::min);
+        let looked_at = self.actors.iter().filter(|actor| actor.look(&self.device, shot, nearest, tile));
+        let looked_at: Vec<&Actor<'_>> = looked_at.collect();
         let mut pass = canvas.fill(&self.device, encoder, tile, &shot.options);
-        self.surface.draw(&mut pass, &self.bindings, dress.map(|dress| &dress.bare));
-        if let Some(dress) = dress {
-            dress.draw(&mut pass);
-        }
+        looked_at.iter().for_each(|actor| actor.draw(&mut pass, shot.lighting.is_some()));
         drop(pass);
         canvas.resolve(&self.device, encoder, tile, &shot.options, (target.view, origin));
         self.canvas = Some(canvas);
         Ok(())
-    }
-
-    fn encoder(&self) -> wgpu::CommandEncoder {
-        self.device.wgpu().create_command_encoder(&wgpu::CommandEncoderDescriptor::default())
     }
 }
 

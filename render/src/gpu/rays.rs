@@ -13,13 +13,25 @@ use texture::appearance::{Lumigraph, NO_RAY};
 /// The rays on the adapter.
 #[derive(Debug)]
 pub(super) struct RayBlend {
-    middle: Point3<f64>,
+    shelf: Shelf,
     eye: wgpu::Buffer,
-    blend: wgpu::RenderPipeline,
     bindings: wgpu::BindGroup,
+    levels: Vec<Level>,
+}
+
+/// What does not depend on the eye: objects of one model share it.
+#[derive(Clone, Debug)]
+struct Shelf {
+    middle: Point3<f64>,
+    size: [u32; 2],
+    /// Colours, views, surface points.
+    textures: [wgpu::TextureView; 3],
+    centers: wgpu::Buffer,
+    blend: wgpu::RenderPipeline,
     push: wgpu::RenderPipeline,
     pull: wgpu::RenderPipeline,
-    levels: Vec<Level>,
+    /// Of a blend.
+    read: u64,
 }
 
 /// A level of the fill.
@@ -44,29 +56,49 @@ impl RayBlend {
         middle: Point3<f64>,
     ) -> Result<Self, GpuError> {
         let size = surface.size.map(|side| side as u32);
-        let texels = u64::from(size[0]) * u64::from(size[1]);
         device.check("rays a texel", rays.rays as u64, u64::from(device.limits().max_texture_array_layers))?;
-        device.check_bytes(texels * (6 * rays.rays as u64 + 16 + 21))?;
         let relative = |p: &Point3<f64>| -> [f32; 4] { (p - middle).push(1.0).cast().into() };
         let centers: Vec<[f32; 4]> = rays.centers.iter().map(relative).collect();
         let centers = device.buffer(cast_slice(&centers), wgpu::BufferUsages::STORAGE)?;
-        let eye = device.buffer(&[0; 16], wgpu::BufferUsages::UNIFORM)?;
-        let blend = device.covering(include_str!("rays.wgsl"), "blend", FORMAT);
         let [colors, views] = arrays(device, rays, surface);
-        let points = points(device, surface, relative);
-        let textures = [&colors, &views, &points].map(wgpu::BindingResource::TextureView);
-        let [colors, views, points] = textures;
-        let bindings = [colors, views, points, centers.as_entire_binding(), eye.as_entire_binding()];
-        let bindings = device.bind(&blend, 0, &bindings);
         let source = include_str!("push_pull.wgsl");
-        let [push, pull] = ["push", "pull"].map(|entry| device.covering(source, entry, FORMAT));
-        let levels = levels(device, size, &push, &pull);
-        Ok(Self { middle, eye, blend, bindings, push, pull, levels })
+        Self::bound(
+            device,
+            Shelf {
+                middle,
+                size,
+                textures: [colors, views, points(device, surface, relative)],
+                centers,
+                blend: device.covering(include_str!("rays.wgsl"), "blend", FORMAT),
+                push: device.covering(source, "push", FORMAT),
+                pull: device.covering(source, "pull", FORMAT),
+                read: 6 * (rays.rays * surface.len()) as u64,
+            },
+        )
+    }
+
+    /// The same rays for another eye.
+    pub(super) fn another(&self, device: &Device) -> Result<Self, GpuError> {
+        Self::bound(device, self.shelf.clone())
+    }
+
+    fn bound(device: &Device, shelf: Shelf) -> Result<Self, GpuError> {
+        let eye = device.buffer(&[0; 16], wgpu::BufferUsages::UNIFORM)?;
+        let [colors, views, points] = shelf.textures.each_ref().map(wgpu::BindingResource::TextureView);
+        let bindings = [colors, views, points, shelf.centers.as_entire_binding(), eye.as_entire_binding()];
+        let bindings = device.bind(&shelf.blend, 0, &bindings);
+        let levels = levels(device, shelf.size, &shelf.push, &shelf.pull);
+        Ok(Self { shelf, eye, bindings, levels })
+    }
+
+    /// Bytes of rays that a blend reads.
+    pub(super) fn read(&self) -> u64 {
+        self.shelf.read
     }
 
     /// Takes the eye to the adapter.
     pub(super) fn look(&self, device: &Device, eye: &Point3<f64>) {
-        let eye: [f32; 4] = (eye - self.middle).push(1.0).cast().into();
+        let eye: [f32; 4] = (eye - self.shelf.middle).push(1.0).cast().into();
         device.queue().write_buffer(&self.eye, 0, cast_slice(&eye));
     }
 
@@ -77,19 +109,25 @@ impl RayBlend {
         // A single texel is its own level.
         let Some(finest) = self.levels.first() else { return };
         let first = if finest.pull.is_none() { atlas.finest() } else { &finest.known };
-        cover(encoder, &self.blend, &self.bindings, (first, clear), whole(finest));
+        cover(encoder, &self.shelf.blend, &self.bindings, (first, clear), whole(finest));
         for level in &self.levels {
             if let Some(bindings) = &level.push {
-                cover(encoder, &self.push, bindings, (&level.known, clear), whole(level));
+                cover(encoder, &self.shelf.push, bindings, (&level.known, clear), whole(level));
             }
         }
         for (l, level) in self.levels.iter().enumerate().rev() {
             let target = if l == 0 { atlas.finest() } else { &level.filled };
             if let Some(bindings) = &level.pull {
-                cover(encoder, &self.pull, bindings, (target, clear), whole(level));
+                cover(encoder, &self.shelf.pull, bindings, (target, clear), whole(level));
             }
         }
     }
+}
+
+/// Bytes that rays take, shared by objects of one model, and that the fill takes for each.
+pub(super) fn bytes(rays: &Lumigraph, surface: &SurfaceTexels) -> [u64; 2] {
+    let texels = surface.size[0] as u64 * surface.size[1] as u64;
+    [texels * (6 * rays.rays.max(1) as u64 + 16), texels * 21]
 }
 
 /// Colours and views of the slots.

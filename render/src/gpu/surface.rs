@@ -57,7 +57,7 @@ struct Frame {
 }
 
 /// Corners of some of the faces.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Vertices {
     buffer: wgpu::Buffer,
     count: u32,
@@ -93,6 +93,17 @@ impl Surface {
         })
     }
 
+    /// The same faces for another pose.
+    pub(super) fn another(&self, device: &Device) -> Result<Self, GpuError> {
+        let frame = device.buffer(&[0; size_of::<Frame>()], wgpu::BufferUsages::UNIFORM)?;
+        Ok(Self { frame, all: self.all.clone(), faces: self.faces.clone(), pipeline: self.pipeline.clone(), ..*self })
+    }
+
+    /// Depths below this are not drawn.
+    pub(super) fn nearest(&self) -> f64 {
+        self.nearest
+    }
+
     /// Corners of the faces of the mesh that `keep` picks.
     pub(super) fn vertices(
         &self,
@@ -119,8 +130,15 @@ impl Surface {
         self.middle
     }
 
-    /// Looks through a camera without a lens at a tile of its frame.
-    pub(super) fn look(&self, device: &Device, camera: &Camera, options: &RenderOptions, tile: &Tile, atlas: &Atlas) {
+    /// Looks through a camera without a lens at a tile of its frame; the depth buffer is 1 at the depth of `nearest`.
+    pub(super) fn look(
+        &self,
+        device: &Device,
+        (camera, nearest): (&Camera, f64),
+        options: &RenderOptions,
+        tile: &Tile,
+        atlas: &Atlas,
+    ) {
         let i = &camera.intrinsics;
         let axis = |k: usize| -> [f32; 4] {
             let row: Vector3<f64> = camera.rotation.row(k).transpose();
@@ -130,7 +148,7 @@ impl Surface {
         let (step, [width, height]) = (1.0 / options.per_side() as f64, atlas.size());
         let center = [i.cx - tile.origin[0] as f64, i.cy - tile.origin[1] as f64];
         let frame = Frame {
-            clip_from_object: self.clip_from_object(camera, tile).cast().into(),
+            clip_from_object: self.clip_from_object(camera, nearest, tile).cast().into(),
             right: axis(0),
             down: axis(1),
             forward: axis(2),
@@ -143,7 +161,7 @@ impl Surface {
     }
 
     /// Depth 1 / z, scaled to be 1 at the nearest; pixels of the tile to −1..=1, y up.
-    fn clip_from_object(&self, camera: &Camera, tile: &Tile) -> Matrix4<f64> {
+    fn clip_from_object(&self, camera: &Camera, nearest: f64, tile: &Tile) -> Matrix4<f64> {
         let i = &camera.intrinsics;
         let [width, height] = tile.size.map(|side| side as f64);
         let [left, top] = tile.origin.map(|side| side as f64);
@@ -159,7 +177,7 @@ impl Surface {
             0.0,
             0.0,
             0.0,
-            self.nearest,
+            nearest,
             0.0,
             0.0,
             1.0,

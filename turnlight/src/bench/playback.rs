@@ -1,16 +1,23 @@
 //! Frames per second of playback, stage by stage, against the bytes a frame must read.
 //!
 //! The eye goes once around the objects, which together cover half of the first frame; a single object stands in the
-//! middle, several on a ring. A frame is timed from a camera to a picture in memory. Reading is timed on a buffer larger
+//! middle, several on a ring. The CPU plays, then graphics hardware where this build and this machine have it. A frame is timed from a camera to a picture in memory. Reading is timed on a buffer larger
 //! than any cache: `bytes_per_frame / memory_bytes_per_s` is what a frame costs at least where layers do not stay in a cache.
 
+use super::player::{Cpu, Player};
+#[cfg(feature = "gpu")]
+use super::player::{Gpu, failed};
+use crate::Error;
+use crate::scene::aabb_of;
+use crate::stages::median;
 use capture::{Aabb, Camera, Image};
 use nalgebra::Vector3;
 use rayon::prelude::*;
-use render::cpu::{Object, ScenePlayer, StageTimes};
-use render::material::Lighting;
+use render::Pose;
+use render::cpu::Object;
+#[cfg(feature = "gpu")]
+use render::gpu;
 use render::path::turntable_cameras;
-use render::{Pose, RenderOptions};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
@@ -47,13 +54,17 @@ pub struct PlaybackReport {
     pub memory_bytes_per_s: f64,
     /// Threads of the pool.
     pub threads: usize,
+    /// Why graphics hardware did not play, in one line.
+    pub note: Option<String>,
 }
 
 /// One turn.
 #[derive(Clone, Debug, Serialize)]
 pub struct PlaybackRun {
-    /// What drew.
-    pub renderer: String,
+    /// `cpu` or `gpu`.
+    pub renderer: &'static str,
+    /// What drew, by name.
+    pub device: String,
     /// Of a frame.
     pub width: usize,
     /// Of a frame.
@@ -73,68 +84,80 @@ pub struct PlaybackRun {
 }
 
 /// Times the playback of `models`, of which there is at least one.
-pub fn playback(models: &[Model], options: &PlaybackOptions) -> PlaybackReport {
-    let runs = options.objects.iter().map(|&count| on_cpu(models, count, options)).collect();
-    PlaybackReport { runs, memory_bytes_per_s: memory_bytes_per_s(), threads: rayon::current_num_threads() }
+///
+/// # Errors
+/// None where only graphics hardware failed: the report's note says so.
+pub fn playback(models: &[Model], options: &PlaybackOptions) -> Result<PlaybackReport, Error> {
+    let threads = rayon::current_num_threads();
+    let mut runs = Vec::new();
+    for &count in &options.objects {
+        let objects = ring(models, count);
+        let device = ("cpu", format!("{threads} threads"));
+        runs.push(run(&mut Cpu::new(&objects), device, &objects, options)?);
+    }
+    let note = on_gpu(models, options, &mut runs).err().map(|fault| format!("no graphics hardware: {fault}"));
+    Ok(PlaybackReport { runs, memory_bytes_per_s: memory_bytes_per_s(), threads, note })
 }
 
-fn on_cpu(models: &[Model], count: usize, options: &PlaybackOptions) -> PlaybackRun {
-    let objects = ring(models, count);
-    let mut player = ScenePlayer::new(&objects, RenderOptions { supersample: 1, background: None });
-    let (lighting, mut frame) = (Lighting::default(), Image::filled(0, 0, [0; 4]));
-    let mut cameras = turn(&objects, options);
+#[cfg(feature = "gpu")]
+fn on_gpu(models: &[Model], options: &PlaybackOptions, runs: &mut Vec<PlaybackRun>) -> Result<(), Error> {
+    let device = gpu::Device::headless().map_err(failed)?;
+    for &count in &options.objects {
+        let objects = ring(models, count);
+        runs.push(run(&mut Gpu::new(&device, &objects)?, ("gpu", device.name().to_owned()), &objects, options)?);
+    }
+    Ok(())
+}
+
+#[cfg(not(feature = "gpu"))]
+fn on_gpu(_: &[Model], _: &PlaybackOptions, _: &mut Vec<PlaybackRun>) -> Result<(), Error> {
+    Err(Error::Failed("this turnlight was built without; build it with --features gpu".to_owned()))
+}
+
+fn run(
+    player: &mut dyn Player,
+    (renderer, device): (&'static str, String),
+    objects: &[Object<'_>],
+    options: &PlaybackOptions,
+) -> Result<PlaybackRun, Error> {
+    let mut frame = Image::filled(0, 0, [0; 4]);
+    let mut cameras = turn(objects, options);
     if let Some(first) = cameras.first() {
-        player.render_into(first, &lighting, &mut frame);
+        player.draw(first, &mut frame)?;
         let zoom = (COVERED / covered(&frame).max(1e-3)).sqrt();
         cameras.iter_mut().for_each(|camera| {
             camera.intrinsics.fx *= zoom;
             camera.intrinsics.fy *= zoom;
         });
     }
-    let (mut stages, mut whole) = (Vec::new(), Vec::new());
+    let mut times: BTreeMap<&'static str, Vec<f64>> = BTreeMap::new();
     let (mut bytes, mut share) = (0.0, 0.0);
-    cameras.iter().take(WARM_UP).for_each(|camera| player.render_into(camera, &lighting, &mut frame));
+    cameras.iter().take(WARM_UP).try_for_each(|camera| player.draw(camera, &mut frame))?;
     for camera in &cameras {
         let start = Instant::now();
-        player.render_into(camera, &lighting, &mut frame);
-        whole.push(start.elapsed().as_secs_f64() * 1e3);
-        stages.push(player.times());
+        player.draw(camera, &mut frame)?;
+        let whole = ("frame", start.elapsed());
+        for (stage, time) in player.stages().into_iter().chain([whole]) {
+            times.entry(stage).or_default().push(time.as_secs_f64() * 1e3);
+        }
         bytes += player.bytes() as f64;
         share += covered(&frame);
     }
     let frames = cameras.len().max(1) as f64;
-    let ms = milliseconds(&stages, whole);
+    let ms: BTreeMap<&'static str, f64> = times.into_iter().map(|(stage, times)| (stage, median(times))).collect();
     let [width, height] = options.size;
-    PlaybackRun {
-        renderer: "cpu".to_owned(),
+    Ok(PlaybackRun {
+        renderer,
+        device,
         width,
         height,
-        objects: count,
-        layers: models.iter().map(layers).max().unwrap_or(0),
-        fps_median: 1e3 / ms["frame"],
+        objects: objects.len(),
+        layers: objects.iter().map(|object| layers(object.model)).max().unwrap_or(0),
+        fps_median: ms.get("frame").map_or(0.0, |frame| 1e3 / frame),
         ms,
         bytes_per_frame: bytes / frames,
         covered_pct: 100.0 * share / frames,
-    }
-}
-
-fn milliseconds(stages: &[StageTimes], whole: Vec<f64>) -> BTreeMap<&'static str, f64> {
-    let stage = |of: fn(&StageTimes) -> std::time::Duration| {
-        median(stages.iter().map(|times| of(times).as_secs_f64() * 1e3).collect())
-    };
-    BTreeMap::from([
-        ("setup", stage(|t| t.setup)),
-        ("visibility", stage(|t| t.visibility)),
-        ("blend", stage(|t| t.blend)),
-        ("shading", stage(|t| t.shading)),
-        ("frame", median(whole)),
-    ])
-}
-
-/// The middle one, or the later of two; 0 of none.
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(0.0)
+    })
 }
 
 fn layers(model: &Model) -> usize {
@@ -164,13 +187,8 @@ fn ring(models: &[Model], count: usize) -> Vec<Object<'_>> {
 
 /// Cameras once around.
 fn turn(objects: &[Object<'_>], options: &PlaybackOptions) -> Vec<Camera> {
-    let corners = objects.iter().filter_map(|object| {
-        let aabb = object.model.mesh.mesh.aabb()?;
-        Some([object.pose.to_world(&aabb.min), object.pose.to_world(&aabb.max)])
-    });
     let unit = Aabb { min: [-0.5; 3].into(), max: [0.5; 3].into() };
-    let around = corners.map(|[min, max]| Aabb { min, max });
-    let aabb = around.reduce(|a, b| Aabb { min: a.min.inf(&b.min), max: a.max.sup(&b.max) }).unwrap_or(unit);
+    let aabb = aabb_of(objects.iter().map(|object| (object.model, &object.pose))).unwrap_or(unit);
     turntable_cameras(&aabb, None, options.frames, options.size[0], options.size[1], Vector3::z())
 }
 
@@ -191,33 +209,41 @@ fn memory_bytes_per_s() -> f64 {
 impl PlaybackReport {
     /// A table.
     pub fn text(&self) -> String {
-        let head = "renderer  objects layers  frames/s |   ms  setup visibility blend shading | MB/frame  covered";
+        let head = "renderer  objects layers  frames/s |    ms  setup visibility  blend shading   draw read back | \
+                    MB/frame  covered";
         let row = |run: &PlaybackRun| {
+            // Stages that a renderer does not have are left blank.
+            let ms = |stage: &str| run.ms.get(stage).map_or(String::new(), |ms| format!("{ms:.2}"));
             format!(
-                "{:9} {:7} {:6} {:9.0} | {:4.1} {:6.2} {:10.2} {:5.2} {:7.2} | {:8.1} {:6.0} %",
+                "{:9} {:7} {:6} {:9.0} | {:5.1} {:>6} {:>10} {:>6} {:>7} {:>6} {:>9} | {:8.1} {:6.0} %",
                 run.renderer,
                 run.objects,
                 run.layers,
                 run.fps_median,
-                run.ms["frame"],
-                run.ms["setup"],
-                run.ms["visibility"],
-                run.ms["blend"],
-                run.ms["shading"],
+                run.ms.get("frame").copied().unwrap_or(0.0),
+                ms("setup"),
+                ms("visibility"),
+                ms("blend"),
+                ms("shading"),
+                ms("draw"),
+                ms("read_back"),
                 run.bytes_per_frame / 1e6,
                 run.covered_pct,
             )
         };
         let size = self.runs.first().map_or([0, 0], |run| [run.width, run.height]);
         let rows: Vec<String> = self.runs.iter().map(row).collect();
+        let gpu = self.runs.iter().find(|run| run.renderer == "gpu").map(|run| format!("\ngpu: {}", run.device));
         let foot = format!(
-            "frames of {} × {}, {} threads; memory is read at {:.1} GB/s",
+            "frames of {} × {}, {} threads; memory is read at {:.1} GB/s{}",
             size[0],
             size[1],
             self.threads,
-            self.memory_bytes_per_s / 1e9
+            self.memory_bytes_per_s / 1e9,
+            gpu.unwrap_or_default(),
         );
-        format!("{head}\n{}\n{foot}", rows.join("\n"))
+        let note = self.note.iter().map(|note| format!("\n{note}"));
+        format!("{head}\n{}\n{foot}{}", rows.join("\n"), note.collect::<String>())
     }
 }
 
@@ -229,12 +255,16 @@ mod tests {
     #[test]
     fn half_of_the_frame_is_covered_and_every_run_reads_something() {
         let options = PlaybackOptions { objects: vec![1, 3], size: [160, 120], frames: 5 };
-        let report = playback(&[bumpy_ball(1)], &options);
-        assert_eq!(report.runs.iter().map(|run| run.objects).collect::<Vec<_>>(), [1, 3]);
+        let report = playback(&[bumpy_ball(1)], &options).unwrap();
+        let of = |renderer: &str| report.runs.iter().filter(|run| run.renderer == renderer).map(|run| run.objects);
+        let gpu = if report.note.is_none() { vec![1, 3] } else { vec![] };
+        assert!(of("cpu").eq([1, 3]) && of("gpu").eq(gpu), "{report:?}");
         for run in &report.runs {
             assert!((30.0..70.0).contains(&run.covered_pct), "{} %", run.covered_pct);
             assert!(run.bytes_per_frame > 1e5 && run.fps_median > 0.0 && run.layers == 20);
         }
-        assert!(report.text().lines().count() == 4);
+        // A head, a foot, and who the hardware is or why there is none.
+        assert_eq!(report.text().lines().count(), report.runs.len() + 3);
+        assert!(cfg!(feature = "gpu") || report.note.is_some_and(|note| note.contains("--features gpu")));
     }
 }

@@ -31,7 +31,7 @@ fn time_playback(args: &BenchPlaybackArgs, observer: &dyn Observer) -> Result<An
     })?;
     let objects = args.objects.map_or(OBJECTS.to_vec(), |count| vec![count]);
     let options = PlaybackOptions { objects, size: args.size, frames: args.frames };
-    let report = stages.run("play", |_| playback(&models, &options));
+    let report = stages.run("play", |_| playback(&models, &options))?;
     let (text, json) = (report.text(), json!(report));
     if let Some(output) = &args.output {
         write_file(output, format!("{json:#}\n").as_bytes())?;

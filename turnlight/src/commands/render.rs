@@ -13,7 +13,7 @@ use turnlight::render::backdrop::put_behind;
 use turnlight::render::film::write_png;
 use turnlight::render::path::{smooth_cameras, turntable_cameras, up_axis};
 use turnlight::scene::Scene;
-use turnlight::stages::{Observer, Stages};
+use turnlight::stages::{Observer, Stages, median};
 use turnlight::{Error, film, playback};
 
 /// Frames of a film for which no number is given.
@@ -46,9 +46,7 @@ pub(crate) fn run(args: &RenderArgs, observer: &dyn Observer) -> Result<Answer, 
 
 fn answer(args: &RenderArgs, cameras: &[Numbered], (times_ms, device): (&[f64], &str), stages: &Stages<'_>) -> Answer {
     let size = cameras.first().map_or([0, 0], |(_, c)| [c.intrinsics.width, c.intrinsics.height]);
-    let mut sorted = times_ms.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    let frame_ms = sorted.get(sorted.len() / 2).copied().unwrap_or(0.0);
+    let frame_ms = median(times_ms.to_vec());
     let places: Vec<String> =
         [&args.output, &args.video].into_iter().flatten().map(|p| format!("\nwrote {}", p.display())).collect();
     let n = cameras.len();
@@ -158,20 +156,26 @@ fn draw(
         frame
     };
     let mut fault = None;
-    let mut keep = |number: usize, frame: &Image<[u8; 4]>| {
-        if let (Some(folder), None) = (folder, &fault) {
-            let write = || Ok(write_png(&folder.place(format!("{number:04}.png"))?, frame)?);
-            fault = write().err();
-        }
+    let keep = |number: usize, frame: &Image<[u8; 4]>| {
+        let write = |folder: &OutputFolder| Ok(write_png(&folder.place(format!("{number:04}.png"))?, frame)?);
+        folder.map_or(Ok(()), write)
     };
     let frames = cameras.iter().enumerate().map(|(i, (number, camera))| {
+        // Nothing is drawn after a fault; a film ends with a frame that is not of its size.
+        if fault.is_some() {
+            return Image::filled(0, 0, [0; 4]);
+        }
         let frame = frame(i, camera);
-        keep(*number, &frame);
+        fault = keep(*number, &frame).err();
         frame
     });
-    match &args.video {
-        Some(video) => film::write_film(video, frames, args.fps)?,
-        None => frames.for_each(drop),
-    }
-    fault.map_or(Ok(projector.device().to_owned()), Err)
+    let filmed = match &args.video {
+        Some(video) => film::write_film(video, frames, args.fps),
+        None => {
+            frames.for_each(drop);
+            Ok(())
+        }
+    };
+    fault.map_or(filmed, Err)?;
+    Ok(projector.device().to_owned())
 }

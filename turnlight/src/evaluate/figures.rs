@@ -151,24 +151,12 @@ fn variance(values: &[f64]) -> f64 {
     values.iter().map(|v| (v - center).powi(2)).sum::<f64>() / values.len().max(1) as f64
 }
 
-/// The middle value, or the mean of the two in the middle; zero of none.
-pub(super) fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    match values.len() {
-        0 => 0.0,
-        n => (values[(n - 1) / 2] + values[n / 2]) / 2.0,
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
     fn averages_have_their_textbook_values() {
-        assert_eq!(median(vec![3.0, 1.0, 2.0]), 2.0);
-        assert_eq!(median(vec![4.0, 1.0, 2.0, 3.0]), 2.5);
-        assert_eq!(median(Vec::new()), 0.0);
         assert_eq!(variance(&[1.0, 3.0]), 1.0);
         assert_eq!(round6(0.123_456_78), 0.123_457);
     }

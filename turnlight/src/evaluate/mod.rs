@@ -18,7 +18,7 @@ pub use table::{csv, text};
 
 use crate::output::OutputFolder;
 use crate::pipeline::{self, ShapeOptions};
-use crate::stages::{Observer, Stages};
+use crate::stages::{Observer, Stages, median};
 use crate::truth::{self, TruthFigures};
 use crate::{Error, playback};
 use capture::{Capture, Image, LoadOptions, View};
@@ -209,7 +209,7 @@ fn judge(
     let frame_size = views.first().map_or([0, 0], |v| [v.image.width(), v.image.height()]);
     let seam = (!seams.is_empty()).then(|| round6(seams.iter().sum::<f64>() / seams.len() as f64));
     let temporal = probes.temporal(model).map(round6);
-    Ok(Judged { views: judged, seam, temporal, frame_ms: figures::median(times_ms), frame_size })
+    Ok(Judged { views: judged, seam, temporal, frame_ms: median(times_ms), frame_size })
 }
 
 fn score_view(
