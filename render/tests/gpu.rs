@@ -7,20 +7,25 @@
 mod difference;
 #[path = "support/models.rs"]
 mod models;
+#[path = "support/scenes.rs"]
+mod scenes;
 mod support;
 
 use capture::btf::{Btf, Encoding, bonn_directions};
-use capture::{Camera, Distortion, Image};
+use capture::{Camera, Image};
 use difference::{Difference, difference};
 use geometry::TexturedMesh;
 use models::{bumpy_ball, dyntex, lumigraph, still, vdtm};
-use nalgebra::{Matrix3, Point3, Vector3};
+use nalgebra::{Matrix3, Point3, Rotation3, Vector3};
+use render::cpu::Object;
 use render::gpu::{Blend, Device, GpuError, Renderer, Shot, Target, wgpu};
 use render::material::{Coat, Coats, Light, Lighting, Lit};
-use render::{RenderOptions, cpu, reference};
+use render::{Pose, RenderOptions, cpu, reference};
+use scenes::{Scene, at, scenes};
 use std::sync::OnceLock;
 use support::{atlas, knot, look_at, sphere, surface, torus};
 use texture::btf::{Budget, Precision, Sampler, gaussian_mixture, multilevel_vq};
+use texture::{Appearance, Layer};
 
 /// The one device of these tests.
 fn device() -> Option<&'static Device> {
@@ -32,10 +37,6 @@ fn device() -> Option<&'static Device> {
             None
         }
     }
-}
-
-fn at(supersample: usize) -> RenderOptions {
-    RenderOptions { supersample, background: None }
 }
 
 fn shot(camera: &Camera, options: RenderOptions) -> Shot<'_> {
@@ -61,12 +62,6 @@ fn drawn(mesh: &TexturedMesh, atlas: &Image<[f32; 3]>, shot: &Shot<'_>) -> Optio
     Some(renderer.render(shot).unwrap())
 }
 
-fn assert_parity(what: &str, mesh: &TexturedMesh, atlas: &Image<[f32; 3]>, camera: &Camera, options: RenderOptions) {
-    let Some(actual) = drawn(mesh, atlas, &shot(camera, options)) else { return };
-    keep(what, &actual);
-    assert_near(what, &reference::render(mesh, atlas, camera, &options), &actual);
-}
-
 /// Writes a picture to look at: `TURNLIGHT_LOOK=DIR cargo test -p render --features gpu --test gpu`.
 fn keep(name: &str, picture: &Image<[u8; 4]>) {
     if let Some(folder) = std::env::var_os("TURNLIGHT_LOOK") {
@@ -74,33 +69,22 @@ fn keep(name: &str, picture: &Image<[u8; 4]>) {
     }
 }
 
-/// Of sphere and knot each cell has a texture that goes on nowhere, unlike charts of a real atlas: every sub-sample that
-/// the hardware's grid for corners puts on the other side of an edge shows.
 #[test]
-fn solids_from_several_eyes() {
-    let atlas = atlas(512, 384);
-    let solids = [("sphere", sphere(40, 20), 0.002), ("torus", torus(60, 24), 0.001), ("knot", knot(160, 12), 0.002)];
-    for (name, mesh, most) in solids {
-        for (eye, n) in [([3.0, 0.4, 1.0], 2), ([0.3, -2.0, 2.0], 1), ([-1.2, 1.1, 0.1], 3)] {
-            let camera = look_at(Point3::from(eye), Point3::origin(), 180.0, 201, 151);
-            let Some(actual) = drawn(&mesh, &atlas, &shot(&camera, at(n))) else { return };
-            let what = format!("{name} {n}");
-            keep(&what, &actual);
-            assert_share(&what, &reference::render(&mesh, &atlas, &camera, &at(n)), &actual, most);
+fn every_scene_is_drawn_alike() {
+    let Some(device) = device() else { return };
+    for Scene { name, mesh, atlas, camera, options, hardware_off } in scenes() {
+        let mut renderer = Renderer::of_mesh(device, &mesh).unwrap();
+        renderer.set_atlas(&atlas).unwrap();
+        let drawn = renderer.render(&shot(&camera, options));
+        if camera.intrinsics.distortion.is_none() {
+            let drawn = drawn.unwrap();
+            keep(&name, &drawn);
+            assert_share(&name, &reference::render(&mesh, &atlas, &camera, &options), &drawn, hardware_off);
+        } else {
+            let fault = drawn.unwrap_err();
+            assert!(matches!(&fault, GpuError::Unsupported { what } if what.contains("lens")), "{name}: {fault}");
         }
     }
-}
-
-#[test]
-fn far_and_near() {
-    let (mesh, atlas) = (knot(200, 16), atlas(1000, 700));
-    let far = look_at(Point3::new(40.0, 5.0, 9.0), Point3::origin(), 700.0, 96, 96);
-    assert_parity("minified", &torus(60, 24), &atlas, &far, at(2));
-    // Faces smaller than sub-samples, each with a texture of its own: corners on the hardware's grid of 1/256 show.
-    let Some(actual) = drawn(&mesh, &atlas, &shot(&far, at(2))) else { return };
-    assert_share("specks", &reference::render(&mesh, &atlas, &far, &at(2)), &actual, 0.01);
-    let near = look_at(Point3::new(1.3, 0.2, 0.1), Point3::origin(), 400.0, 96, 96);
-    assert_parity("magnified", &mesh, &atlas, &near, at(2));
 }
 
 #[test]
@@ -108,36 +92,57 @@ fn background_is_opaque() {
     let (mesh, atlas) = (torus(30, 12), atlas(64, 64));
     let camera = look_at(Point3::new(2.5, 1.0, 1.5), Point3::origin(), 120.0, 80, 60);
     let options = RenderOptions { supersample: 2, background: Some([10, 200, 30]) };
-    assert_parity("background", &mesh, &atlas, &camera, options);
     let Some(frame) = drawn(&mesh, &atlas, &shot(&camera, options)) else { return };
     assert_eq!(frame.at(0, 0), [10, 200, 30, 255]);
     assert!(frame.pixels().iter().all(|p| p[3] == 255));
 }
 
+/// Several objects of two models, posed, one of them nowhere: what the CPU draws of the same scene.
 #[test]
-fn skew_is_exact_and_a_lens_is_refused() {
-    let (mesh, atlas) = (sphere(40, 20), atlas(256, 256));
-    let mut camera = look_at(Point3::new(2.6, 0.6, 0.4), Point3::origin(), 150.0, 160, 120);
-    camera.intrinsics.skew = 12.0;
-    camera.intrinsics.fy = 140.0;
-    assert_parity("skew", &mesh, &atlas, &camera, at(2));
-    camera.intrinsics.distortion = Distortion { k1: -0.25, ..Distortion::default() };
+fn whole_scenes_are_drawn_alike_whoever_blends() {
     let Some(device) = device() else { return };
-    let fault = Renderer::of_mesh(device, &mesh).unwrap().render(&shot(&camera, at(1))).unwrap_err();
-    assert!(matches!(&fault, GpuError::Unsupported { what } if what.contains("lens")), "{fault}");
+    let ball = || bumpy_ball(9, [200, 180]);
+    let models = [dyntex(ball(), 8, 30, |facet| 1 + facet % 8), lumigraph(ball(), 7)];
+    let rotation = Rotation3::from_euler_angles(0.4, 0.2, -1.0).into_inner();
+    let poses = [
+        Pose { rotation, translation: Vector3::new(1.5, 0.6, 0.1), scale: 0.4 },
+        Pose { translation: Vector3::new(-1.0, 0.0, 0.0), ..Pose::default() },
+        Pose { rotation, translation: Vector3::new(-3.0, 2.0, -0.5), scale: 1.7 },
+        Pose { translation: Vector3::repeat(f64::NAN), ..Pose::default() },
+    ];
+    let object = |(k, pose): (usize, &Pose)| Object { pose: *pose, ..Object::new(&models[k % 2]) };
+    let mut objects: Vec<Object<'_>> = poses.iter().enumerate().map(object).collect();
+    objects.push(Object { pose: Pose { translation: Vector3::new(0.0, -2.0, 0.0), ..poses[0] }, ..objects[0] });
+    let mut player = cpu::ScenePlayer::new(&objects, at(2));
+    for blend in [Blend::Adapter, Blend::Cpu] {
+        let mut renderer = Renderer::of_scene(device, &objects, blend).unwrap();
+        for (i, eye) in [[5.0, 0.4, 1.0], [0.3, -6.0, 2.0], [5.0, 0.4, 1.0]].into_iter().enumerate() {
+            let camera = look_at(Point3::from(eye), Point3::origin(), 180.0, 201, 151);
+            let name = format!("scene {blend:?} {i}");
+            let actual = renderer.render(&shot(&camera, at(2))).unwrap();
+            keep(&name, &actual);
+            assert_near(&name, &player.render(&camera, &Lighting::default()), &actual);
+            assert!(renderer.bytes() > 0, "{name}");
+        }
+    }
+    let mut empty = Renderer::of_scene(device, &[], Blend::Adapter).unwrap();
+    let camera = look_at(Point3::new(5.0, 0.4, 1.0), Point3::origin(), 180.0, 20, 15);
+    assert!(empty.render(&shot(&camera, at(1))).unwrap().pixels().iter().all(|p| *p == [0; 4]));
 }
 
+/// A model without texels is black, as everywhere.
 #[test]
-fn eye_inside_the_mesh() {
-    let atlas = atlas(256, 256);
-    for (i, eye) in [[0.0, 0.0, 0.0], [0.9, 0.1, 0.2], [0.3, 0.3, -0.8]].into_iter().enumerate() {
-        let camera = look_at(Point3::from(eye), Point3::new(0.2, -1.0, 0.3), 60.0, 120, 90);
-        assert_parity(&format!("inside {i}"), &sphere(24, 12), &atlas, &camera, at(2));
+fn a_model_without_texels_is_black() {
+    let Some(device) = device() else { return };
+    let mut model = still(bumpy_ball(5, [40, 30]));
+    let Appearance::Layers(layers) = &mut model.appearance else { return };
+    layers.facet_of_texel = Image::filled(0, 0, 0);
+    layers.layers.iter_mut().for_each(|layer| layer.texels = Image::filled(0, 0, [0; 3]));
+    let camera = look_at(Point3::new(3.0, 0.4, 1.0), Point3::origin(), 60.0, 60, 45);
+    for blend in [Blend::Adapter, Blend::Cpu] {
+        let frame = Renderer::with_blend(device, &model, blend).unwrap().render(&shot(&camera, at(1))).unwrap();
+        assert_near("black", &reference::render(&model.mesh, &Image::filled(0, 0, [0.0; 3]), &camera, &at(1)), &frame);
     }
-    // A floor from under one's feet to the horizon crosses the camera plane.
-    let floor = surface(3, 3, false, |s, t| Point3::new(40.0 * (s - 0.5), 40.0 * (t - 0.5), 0.0));
-    let camera = look_at(Point3::new(0.1, 0.2, 0.7), Point3::new(5.0, 3.0, 0.5), 60.0, 120, 90);
-    assert_parity("floor", &floor, &atlas, &camera, at(2));
 }
 
 #[test]
@@ -205,6 +210,24 @@ fn what_does_not_fit_is_refused() {
     let fault = Renderer::with_blend(device, &model, Blend::Adapter).unwrap_err();
     assert!(fault.to_string().contains("5000 layers"), "{fault}");
     assert!(Renderer::with_blend(device, &model, Blend::Cpu).is_ok());
+}
+
+/// Neither layers nor atlas are a GiB, but both together; the layers of one model count once, the atlases of its objects
+/// each. Nothing is read of what is refused.
+#[test]
+fn what_does_not_fit_together_is_refused() {
+    let Some(device) = device() else { return };
+    let mut model = still(bumpy_ball(3, [40, 30]));
+    let Appearance::Layers(layers) = &mut model.appearance else { return };
+    let side = 4096;
+    layers.facet_of_texel = Image::filled(side, side, 0);
+    let empty = Image::filled(0, 0, [0; 3]);
+    layers.layers = vec![Layer { texels: empty, scale: 1.0, offset: 0.0, coded: Vec::new() }; 14];
+    let fault = Renderer::with_blend(device, &model, Blend::Adapter).unwrap_err();
+    assert!(fault.to_string().starts_with("1098 MiB of textures, where"), "{fault}");
+    let seven = vec![Object::new(&model); 7];
+    let fault = Renderer::of_scene(device, &seven, Blend::Cpu).unwrap_err();
+    assert!(fault.to_string().starts_with("1194 MiB of textures, where"), "{fault}");
 }
 
 /// A window's target: another format, its size not that of one tile, and an encoding of its own.

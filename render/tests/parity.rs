@@ -2,53 +2,33 @@
 
 #[path = "support/difference.rs"]
 mod difference;
+#[path = "support/scenes.rs"]
+mod scenes;
 mod support;
 
+use capture::Image;
 use capture::btf::{Encoding, bonn_directions};
-use capture::{Camera, Distortion, Image};
 use difference::difference;
-use geometry::TexturedMesh;
 use nalgebra::{Point3, Vector3};
 use render::material::{Coat, Coats, Light, Lighting, Lit};
 use render::{RenderOptions, cpu, reference};
+use scenes::{Scene, at, scenes};
 use std::sync::Arc;
 use support::{atlas, knot, look_at, sphere, surface, torus};
 use texture::btf::{DirectionSet, Frame, Sampler};
 
 /// Parity as we promise it: 99.9 % of inner pixels to rounding; of edge pixels as much, for both
 /// renderers test the same points and only ties may fall differently.
-fn assert_parity(what: &str, mesh: &TexturedMesh, atlas: &Image<[f32; 3]>, camera: &Camera, options: &RenderOptions) {
-    let expected = reference::render(mesh, atlas, camera, options);
-    let actual = cpu::render(mesh, atlas, camera, options);
-    let d = difference(&expected, &actual);
-    println!("{what}: {d:?}");
-    assert!(d.inner + d.edge > 100, "{what}: nothing to compare: {d:?}");
-    assert!(d.inner_off * 1000 <= d.inner, "{what}: {d:?}");
-    assert!(d.edge_off * 100 <= d.edge, "{what}: {d:?}");
-}
-
-fn at(supersample: usize) -> RenderOptions {
-    RenderOptions { supersample, background: None }
-}
-
 #[test]
-fn solids_from_several_eyes() {
-    let atlas = atlas(512, 384);
-    for (name, mesh) in [("sphere", sphere(40, 20)), ("torus", torus(60, 24)), ("knot", knot(160, 12))] {
-        for (eye, n) in [([3.0, 0.4, 1.0], 2), ([0.3, -2.0, 2.0], 1), ([-1.2, 1.1, 0.1], 3)] {
-            let camera = look_at(Point3::from(eye), Point3::origin(), 180.0, 201, 151);
-            assert_parity(name, &mesh, &atlas, &camera, &at(n));
-        }
+fn every_scene_is_drawn_alike() {
+    for Scene { name, mesh, atlas, camera, options, .. } in scenes() {
+        let expected = reference::render(&mesh, &atlas, &camera, &options);
+        let d = difference(&expected, &cpu::render(&mesh, &atlas, &camera, &options));
+        println!("{name}: {d:?}");
+        assert!(d.inner + d.edge > 100, "{name}: nothing to compare: {d:?}");
+        assert!(d.inner_off * 1000 <= d.inner, "{name}: {d:?}");
+        assert!(d.edge_off * 100 <= d.edge, "{name}: {d:?}");
     }
-}
-
-#[test]
-fn far_and_near() {
-    let (mesh, atlas) = (knot(200, 16), atlas(1024, 1024));
-    let far = look_at(Point3::new(40.0, 5.0, 9.0), Point3::origin(), 700.0, 96, 96);
-    assert_parity("minified", &mesh, &atlas, &far, &at(2));
-    let near = look_at(Point3::new(1.3, 0.2, 0.1), Point3::origin(), 400.0, 96, 96);
-    assert_parity("magnified", &mesh, &atlas, &near, &at(2));
 }
 
 #[test]
@@ -56,36 +36,9 @@ fn background_is_opaque() {
     let (mesh, atlas) = (torus(30, 12), atlas(64, 64));
     let camera = look_at(Point3::new(2.5, 1.0, 1.5), Point3::origin(), 120.0, 80, 60);
     let options = RenderOptions { supersample: 2, background: Some([10, 200, 30]) };
-    assert_parity("background", &mesh, &atlas, &camera, &options);
     let frame = cpu::render(&mesh, &atlas, &camera, &options);
     assert_eq!(frame.at(0, 0), [10, 200, 30, 255]);
     assert!(frame.pixels().iter().all(|p| p[3] == 255));
-}
-
-#[test]
-fn skew_and_lens_are_exact() {
-    let (mesh, atlas) = (sphere(40, 20), atlas(256, 256));
-    let mut camera = look_at(Point3::new(2.6, 0.6, 0.4), Point3::origin(), 150.0, 160, 120);
-    camera.intrinsics.skew = 12.0;
-    camera.intrinsics.fy = 140.0;
-    assert_parity("skew", &mesh, &atlas, &camera, &at(2));
-    camera.intrinsics.distortion = Distortion { k1: -0.25, k2: 0.08, k3: 0.0, p1: 0.001, p2: -0.0005 };
-    assert_parity("barrel", &mesh, &atlas, &camera, &at(2));
-    camera.intrinsics.distortion = Distortion { k1: 0.2, ..Distortion::default() };
-    assert_parity("pincushion", &mesh, &atlas, &camera, &at(1));
-}
-
-#[test]
-fn eye_inside_the_mesh() {
-    let atlas = atlas(256, 256);
-    for eye in [[0.0, 0.0, 0.0], [0.9, 0.1, 0.2], [0.3, 0.3, -0.8]] {
-        let camera = look_at(Point3::from(eye), Point3::new(0.2, -1.0, 0.3), 60.0, 120, 90);
-        assert_parity("inside sphere", &sphere(24, 12), &atlas, &camera, &at(2));
-    }
-    // A floor from under one's feet to the horizon crosses the camera plane.
-    let floor = surface(3, 3, false, |s, t| Point3::new(40.0 * (s - 0.5), 40.0 * (t - 0.5), 0.0));
-    let camera = look_at(Point3::new(0.1, 0.2, 0.7), Point3::new(5.0, 3.0, 0.5), 60.0, 120, 90);
-    assert_parity("floor", &floor, &atlas, &camera, &at(2));
 }
 
 /// The harness itself: a picture that is off in one texel of every hundred must not pass.

@@ -3,7 +3,7 @@
 use super::kernel::blend;
 use super::pack::{Line, VALUES};
 use super::weights::Weights;
-use super::{Atlas, Wanted};
+use super::{Atlas, Source, Wanted};
 use crate::filter::{FIXED_ONE, FIXED_PLACES};
 use crate::simd::Level;
 use capture::Image;
@@ -105,6 +105,25 @@ fn a_blend_is_the_atlas_to_a_fraction_of_a_level() {
             }
         }
     }
+}
+
+/// Two textures of one model are two eyes', though they read the same lines.
+#[test]
+fn textures_of_one_model_share_its_layers_and_nothing_else() {
+    let size = [70, 45];
+    let model = model(size, [1, 2, 5, 20], 0.2);
+    let first = Atlas::new(&model);
+    let mut both = [first.another(), first.another()];
+    let eyes = [Point3::new(1.0, 2.0, 3.0), Point3::new(9.0, 0.1, -2.0)];
+    both.iter_mut().zip(&eyes).for_each(|(atlas, eye)| atlas.blend(eye, &Wanted::all(size, 0)));
+    for (atlas, eye) in both.iter().zip(&eyes) {
+        let mut alone = Atlas::new(&model);
+        alone.blend(eye, &Wanted::all(size, 0));
+        assert!(alone.texels() == atlas.texels());
+        let (Source::Layers(one), Source::Layers(other)) = (&first.source, &atlas.source) else { return };
+        assert!(std::sync::Arc::ptr_eq(&one.packed, &other.packed));
+    }
+    assert!(both[0].texels() != both[1].texels());
 }
 
 /// Reductions made block by block are those of the whole.

@@ -194,6 +194,16 @@ impl<'a> Actor<'a> {
     }
 }
 
+#[cfg(test)]
+impl Actor<'_> {
+    /// Takes the weights away from the driver.
+    pub(super) fn break_layers(&self) {
+        if let Source::Layers(layers) = &self.source {
+            layers.break_weights();
+        }
+    }
+}
+
 impl<'a> Source<'a> {
     fn new(device: &Device, model: &'a Model, blend: Blend, surface: &Surface) -> Result<Self, GpuError> {
         Ok(match (blend, &model.appearance) {

@@ -102,6 +102,13 @@ impl<'a> LayerBlend<'a> {
     }
 }
 
+#[cfg(test)]
+impl LayerBlend<'_> {
+    pub(super) fn break_weights(&self) {
+        self.weights.destroy();
+    }
+}
+
 /// Bytes that layers take: four a texel and layer, two a texel for its facet.
 pub(super) fn bytes(layers: &Layers) -> u64 {
     layers.facet_of_texel.pixels().len() as u64 * (4 * layers.layers.len().max(1) as u64 + 2)

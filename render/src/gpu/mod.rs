@@ -311,8 +311,13 @@ fn refuse_lens(camera: &Camera) -> Result<(), GpuError> {
 }
 
 #[cfg(test)]
+#[path = "../../tests/support/models.rs"]
+mod models;
+
+#[cfg(test)]
 mod tests {
     use super::*;
+    use nalgebra::Vector3;
     use wgpu::naga;
 
     /// Every program that is handed to a driver, under the names of the files it is made of.
@@ -352,6 +357,24 @@ mod tests {
             let name = entry.unwrap().file_name().into_string().unwrap();
             let Some(stem) = name.strip_suffix(".wgsl") else { continue };
             assert!(programs.iter().any(|(files, _)| files.contains(&stem)), "{name} is in no program");
+        }
+    }
+
+    /// What the driver refused is tried again, not taken for done.
+    #[test]
+    fn a_blend_that_failed_is_not_taken_for_fresh() {
+        let device = match Device::headless() {
+            Ok(device) => device,
+            Err(fault) => return println!("skipped: {fault}"),
+        };
+        let model = models::dyntex(models::bumpy_ball(5, [40, 30]), 4, 20, |_| 4);
+        let camera = crate::path::turntable_cameras(&model.mesh.mesh.aabb().unwrap(), None, 1, 40, 30, Vector3::z())[0];
+        let shot = Shot { camera: &camera, lighting: None, options: RenderOptions::default() };
+        let mut renderer = Renderer::with_blend(&device, &model, Blend::Adapter).unwrap();
+        renderer.actors[0].break_layers();
+        for attempt in 0..2 {
+            let fault = renderer.render(&shot).unwrap_err();
+            assert!(matches!(fault, GpuError::Driver { .. }), "attempt {attempt}: {fault}");
         }
     }
 
