@@ -3,10 +3,12 @@
 use super::WindowError;
 use super::screen::Screen;
 use egui_winit::egui::{Context, Ui, ViewportCommand, ViewportId, ViewportInfo};
+use std::fmt::Display;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use winit::application::ApplicationHandler;
 use winit::dpi::LogicalSize;
+use winit::error::EventLoopError;
 use winit::event::{StartCause, WindowEvent};
 use winit::event_loop::{ActiveEventLoop, ControlFlow, EventLoop};
 use winit::window::{Window, WindowId};
@@ -41,11 +43,18 @@ pub struct WindowOptions {
 /// # Errors
 /// [`WindowError`] where there is no display, or nothing draws on it.
 pub fn open(options: &WindowOptions, show: &mut dyn Show) -> Result<(), WindowError> {
-    let no_display = |fault: winit::error::EventLoopError| WindowError::NoDisplay { fault: fault.to_string() };
+    let no_display = |fault: EventLoopError| WindowError::NoDisplay { fault: in_words(&fault) };
     let events = EventLoop::new().map_err(no_display)?;
     let mut host = Host { options, show, open: None, fault: None };
     events.run_app(&mut host).map_err(no_display)?;
     host.fault.map_or(Ok(()), Err)
+}
+
+/// What the system said, without the line of winit's source that passed it on.
+fn in_words(fault: &impl Display) -> String {
+    let text = fault.to_string();
+    let words = text.split_once(".rs:").and_then(|(_, rest)| rest.split_once(": ")).map(|(_, words)| words);
+    words.unwrap_or(&text).trim_end_matches('.').to_owned()
 }
 
 struct Host<'a> {
@@ -70,7 +79,7 @@ impl Open {
             .with_title(options.title.clone())
             .with_inner_size(LogicalSize::new(width, height))
             .with_min_inner_size(LogicalSize::new(320.0, 240.0));
-        let window = events.create_window(attributes).map_err(|e| WindowError::NoDisplay { fault: e.to_string() })?;
+        let window = events.create_window(attributes).map_err(|e| WindowError::NoDisplay { fault: in_words(&e) })?;
         let window = Arc::new(window);
         let screen = Screen::new(&window, events)?;
         let context = Context::default();

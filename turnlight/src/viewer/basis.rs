@@ -2,7 +2,7 @@
 
 use capture::{Image, reduced};
 use nalgebra::Point3;
-use texture::{Appearance, FacetWeights, Layers, Model};
+use texture::{Appearance, FacetWeights, Layer, Layers, Method, Model};
 
 /// One layer, as a slider shows it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -21,10 +21,26 @@ pub fn layers(model: &Model) -> Option<&Layers> {
     }
 }
 
-/// The layers as they are stored, no side longer than `side`, which must be above 0.
-pub fn thumbnails(layers: &Layers, side: usize) -> Vec<Image<[u8; 3]>> {
+/// The layers, no side longer than `side`. All but those of photographs are stretched about their mean, so that what they
+/// change can be seen.
+pub fn thumbnails(model: &Model, layers: &Layers, side: usize) -> Vec<Image<[u8; 3]>> {
     let small = |texels: &Image<[u8; 3]>| reduced(texels, texels.width().max(texels.height()).div_ceil(side.max(1)));
-    layers.layers.iter().map(|layer| small(&layer.texels)).collect()
+    let thumbnail = |(k, layer): (usize, &Layer)| {
+        let small = small(&layer.texels);
+        if k > 0 && model.method == Method::DynTex { stretched(&small) } else { small }
+    };
+    layers.layers.iter().enumerate().map(thumbnail).collect()
+}
+
+/// Three standard deviations fill the range.
+fn stretched(image: &Image<[u8; 3]>) -> Image<[u8; 3]> {
+    let values = image.pixels().as_flattened();
+    let count = values.len().max(1) as f64;
+    let mean = values.iter().map(|&v| f64::from(v)).sum::<f64>() / count;
+    let variance = values.iter().map(|&v| (f64::from(v) - mean).powi(2)).sum::<f64>() / count;
+    let gain = (127.0 / (3.0 * variance.sqrt()).max(1.0)).max(1.0);
+    // Casts saturate.
+    image.map(|pixel| pixel.map(|v| (127.5 + gain * (f64::from(v) - mean)).round() as u8))
 }
 
 /// The weights of a facet's layers as seen from `eye`, in the model's coordinates.

@@ -128,6 +128,7 @@ struct Drawn<'a> {
     exhibit: &'a Exhibit,
     coats: &'a [Option<Coats<'a>>],
     projector: Projector<'a>,
+    why_cpu: Option<String>,
     facets: Option<ScenePlayer<'a>>,
     ranks: Option<ScenePlayer<'a>>,
     /// Draws for comparison with photographs, with nothing behind it.
@@ -226,6 +227,11 @@ impl<'a> Viewer<'a> {
         self.drawn[self.current()].projector.device()
     }
 
+    /// Why it is the CPU, where hardware was asked for.
+    pub fn why_cpu(&self) -> Option<&str> {
+        self.drawn[self.current()].why_cpu.as_deref()
+    }
+
     /// Whether any model has materials.
     pub fn has_materials(&self) -> bool {
         self.drawn.iter().any(|drawn| drawn.coats.iter().any(Option::is_some))
@@ -294,7 +300,7 @@ impl<'a> Viewer<'a> {
             Side::Difference(k) => self.difference_seen(k, camera),
             Side::Method(_) | Side::Photograph => {
                 let frame = drawn.projector.frame(camera, &lighting);
-                self.notes.extend(drawn.projector.take_note());
+                drawn.why_cpu = drawn.projector.take_note().or(drawn.why_cpu.take());
                 frame
             }
         }
@@ -475,8 +481,8 @@ impl<'a> Drawn<'a> {
         let background = exhibit.scene.backdrop.is_none().then_some(BACKGROUND);
         let options = RenderOptions { background, ..RenderOptions::default() };
         let projector = Projector::new(&exhibit.scene, coats, options, renderer)?;
-        let (facets, ranks, compared, picked, pins) = (None, None, None, None, Vec::new());
-        Ok(Self { exhibit, coats, projector, facets, ranks, compared, picked, pins })
+        let (facets, ranks, compared) = (None, None, None);
+        Ok(Self { exhibit, coats, projector, why_cpu: None, facets, ranks, compared, picked: None, pins: Vec::new() })
     }
 
     fn facets(&mut self) -> &mut ScenePlayer<'a> {

@@ -5,6 +5,7 @@ use crate::viewer::basis;
 use capture::Image;
 use render::blend::Pin;
 use render::window::egui::{ColorImage, Context, RichText, Slider, TextureHandle, TextureOptions, Ui, Vec2};
+use texture::{Layers, Model};
 
 /// Longest side of a picture, in pixels, and of one in the list, in points.
 const LARGE: usize = 256;
@@ -21,7 +22,7 @@ pub(super) struct Thumbnails {
 }
 
 impl Thumbnails {
-    fn make(&mut self, context: &Context, of: [usize; 2], layers: &texture::Layers) {
+    fn make(&mut self, context: &Context, of: [usize; 2], model: &Model, layers: &Layers) {
         if self.of == Some(of) {
             return;
         }
@@ -29,7 +30,7 @@ impl Thumbnails {
             let picture = ColorImage::from_rgb([picture.width(), picture.height()], picture.pixels().as_flattened());
             context.load_texture("layer", picture, TextureOptions::LINEAR)
         };
-        self.textures = basis::thumbnails(layers, LARGE).iter().map(texture).collect();
+        self.textures = basis::thumbnails(model, layers, LARGE).iter().map(texture).collect();
         self.of = Some(of);
     }
 }
@@ -45,7 +46,7 @@ impl App<'_> {
             ui.weak("A lumigraph has rays, no layers.");
             return;
         };
-        self.thumbnails.make(ui.ctx(), [current, picked.object], layers);
+        self.thumbnails.make(ui.ctx(), [current, picked.object], model, layers);
         ui.horizontal(|ui| {
             ui.radio_value(&mut self.thumbnails.is_whole, false, format!("facet {}", picked.facet));
             ui.radio_value(&mut self.thumbnails.is_whole, true, "all facets");
@@ -84,7 +85,7 @@ impl App<'_> {
                 let name = if is_held { format!("layer {layer}, held") } else { format!("layer {layer}") };
                 ui.label(RichText::new(name).small().color(colour));
                 ui.spacing_mut().item_spacing = Vec2::new(6.0, 2.0);
-                ui.add(Slider::new(weight, low..=high).fixed_decimals(2)).changed()
+                ui.add(Slider::new(weight, low..=high).custom_formatter(|weight, _| format!("{weight:.2}"))).changed()
             })
         });
         row.inner.inner

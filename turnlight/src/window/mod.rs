@@ -35,7 +35,7 @@ pub struct WindowOptions {
     pub size: [usize; 2],
     /// Panels that are unfolded.
     pub panels: Vec<Panel>,
-    /// Whether there are panels at all to begin with.
+    /// Whether there is anything but the picture to begin with.
     pub has_panels: bool,
     /// Write the first picture here and close.
     pub screenshot: Option<PathBuf>,
@@ -87,9 +87,9 @@ impl Show for App<'_> {
 
     fn draw(&mut self, ui: &mut Ui) {
         let push = self.keys(ui.ctx());
-        let status = Frame::new().fill(style::PANEL).inner_margin(egui::Margin::symmetric(12, 5));
-        egui::Panel::bottom("status").frame(status).show(ui, |ui| self.status(ui));
         if self.has_panels {
+            let status = Frame::new().fill(style::PANEL).inner_margin(egui::Margin::symmetric(12, 5));
+            egui::Panel::bottom("status").frame(status).show(ui, |ui| self.status(ui));
             let frame = Frame::new().fill(style::PANEL).inner_margin(style::MARGIN);
             let panels = egui::Panel::right("panels").frame(frame).resizable(false).exact_size(PANELS_WIDTH);
             panels.show(ui, |ui| ScrollArea::vertical().auto_shrink(false).show(ui, |ui| self.panels(ui)));
