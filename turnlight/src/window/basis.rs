@@ -85,7 +85,8 @@ impl App<'_> {
                 let name = if is_held { format!("layer {layer}, held") } else { format!("layer {layer}") };
                 ui.label(RichText::new(name).small().color(colour));
                 ui.spacing_mut().item_spacing = Vec2::new(6.0, 2.0);
-                ui.add(Slider::new(weight, low..=high).custom_formatter(|weight, _| format!("{weight:.2}"))).changed()
+                ui.add(Slider::new(weight, low..=high).custom_formatter(|weight, _| format!("{:.2}", weight + 0.0)))
+                    .changed()
             })
         });
         row.inner.inner

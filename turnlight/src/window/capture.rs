@@ -20,10 +20,10 @@ impl App<'_> {
             if ui.button("Go there").clicked() {
                 self.viewer.visit(nearest);
             }
-            if ui.button("◀").clicked() {
+            if ui.button("Previous").clicked() {
                 self.viewer.visit((nearest + count - 1) % count);
             }
-            if ui.button("▶").clicked() {
+            if ui.button("Next").clicked() {
                 self.viewer.visit((nearest + 1) % count);
             }
         });

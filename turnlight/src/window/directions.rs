@@ -17,13 +17,13 @@ impl App<'_> {
         plot(ui, &dome);
         let of = format!("facet {}, {} directions", picked.facet, dome.sites.len());
         ui.label(RichText::new(of).small());
-        let shares: Vec<String> = dome
-            .shares
-            .iter()
-            .filter(|(_, share)| *share >= 0.005)
-            .map(|(site, share)| format!("{:.0} % of direction {site}", 100.0 * share))
-            .collect();
-        let blend = if shares.is_empty() { "the nearest rays of every texel".to_owned() } else { shares.join(", ") };
+        let share = |(site, share): &(usize, f64)| format!("{:.0} % of direction {site}", 100.0 * share);
+        let shares: Vec<String> = dome.shares.iter().filter(|(_, share)| *share >= 0.005).map(share).collect();
+        let blend = match (dome.sites.len(), shares.as_slice()) {
+            (0, _) => "the same from everywhere".to_owned(),
+            (_, []) => "the nearest rays of every texel".to_owned(),
+            _ => shares.join(", "),
+        };
         ui.weak(RichText::new(blend).small());
     }
 }

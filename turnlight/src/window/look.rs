@@ -49,13 +49,27 @@ impl App<'_> {
 
     /// What a side is called.
     pub(super) fn name(&self, side: Side) -> String {
-        let of = |k: usize| self.viewer.exhibits().get(k).map(|exhibit| exhibit.name.clone()).unwrap_or_default();
+        let what = match side {
+            Side::Method(k) => return self.exhibit_name(k),
+            Side::Facets(_) => "facets",
+            Side::Ranks(_) => "ranks",
+            Side::Difference(_) => "difference",
+            Side::Photograph => "photograph",
+        };
+        what.to_owned()
+    }
+
+    /// The same, with the method it is about.
+    pub(super) fn full_name(&self, side: Side) -> String {
         match side {
-            Side::Method(k) => of(k),
-            Side::Facets(_) => "facets".to_owned(),
-            Side::Ranks(_) => "ranks".to_owned(),
-            Side::Difference(_) => "difference".to_owned(),
-            Side::Photograph => "photograph".to_owned(),
+            Side::Method(_) | Side::Photograph => self.name(side),
+            Side::Facets(k) | Side::Ranks(k) | Side::Difference(k) => {
+                format!("{}, {}", self.exhibit_name(k), self.name(side))
+            }
         }
+    }
+
+    fn exhibit_name(&self, k: usize) -> String {
+        self.viewer.exhibits().get(k).map(|exhibit| exhibit.name.clone()).unwrap_or_default()
     }
 }

@@ -20,7 +20,7 @@ use crate::viewer::{Panel, Viewer};
 use basis::Thumbnails;
 use recorder::Recorder;
 use render::window::egui::{
-    self, CentralPanel, CollapsingHeader, Context, Frame, RichText, ScrollArea, Ui, ViewportCommand,
+    self, CentralPanel, CollapsingHeader, Context, Frame, RichText, ScrollArea, Separator, Ui, ViewportCommand,
 };
 use render::window::{Show, open};
 use stage::Stage;
@@ -43,6 +43,9 @@ pub struct WindowOptions {
 
 /// Width of the panels, in points.
 const PANELS_WIDTH: f32 = 316.0;
+
+/// Height of a line between them.
+const SEPARATION: f32 = 2.0;
 
 /// Shows what `viewer` sees until the window is closed.
 ///
@@ -125,7 +128,7 @@ impl App<'_> {
                 Panel::Times => "Frame times",
                 Panel::Keys => "Keys",
             };
-            ui.separator();
+            ui.add(Separator::default().spacing(SEPARATION));
             let is_open = self.panels.contains(&panel);
             let header = CollapsingHeader::new(RichText::new(title).strong()).id_salt(panel.name()).open(Some(is_open));
             let answer = header.show_unindented(ui, |ui| self.panel(ui, panel));
@@ -133,7 +136,7 @@ impl App<'_> {
                 self.toggle(panel);
             }
         }
-        ui.separator();
+        ui.add(Separator::default().spacing(SEPARATION));
         self.files(ui);
     }
 

@@ -13,7 +13,13 @@ use std::time::Instant;
 const GRIP: f32 = 7.0;
 
 /// Pauses longer than this are none of the motion.
-const LONGEST_STEP_S: f64 = 0.1;
+const LONGEST_STEP_S: f64 = 0.25;
+
+/// What moves is drawn with fewer pixels where all of them take longer than this.
+const PATIENCE_MS: f64 = 60.0;
+
+/// So many pixels become one at most, along a side.
+const COARSEST: usize = 4;
 
 /// Frames over whose intervals frames a second are averaged.
 const INTERVALS: usize = 30;
@@ -26,6 +32,8 @@ pub(super) struct Stage {
     pub(super) size: [usize; 2],
     is_dividing: bool,
     last: Option<Instant>,
+    /// How long the last picture with all its pixels took.
+    whole_ms: f64,
     /// Seconds between the last frames that were drawn one after the other.
     intervals_s: Vec<f64>,
 }
@@ -37,16 +45,23 @@ impl Stage {
         (sum > 0.0).then(|| self.intervals_s.len() as f64 / sum)
     }
 
+    /// Pixels, along a side, that become one while something moves.
+    fn coarseness(&self) -> usize {
+        let pixels = (self.whole_ms / PATIENCE_MS).sqrt().ceil() as usize;
+        pixels.clamp(1, COARSEST)
+    }
+
     fn put(&mut self, context: &Context, frame: &Image<[u8; 4]>) {
-        let picture =
-            ColorImage::from_rgba_premultiplied([frame.width(), frame.height()], frame.pixels().as_flattened());
+        let size = [frame.width(), frame.height()];
+        let picture = ColorImage::from_rgba_premultiplied(size, frame.pixels().as_flattened());
+        let options = if size == self.size { TextureOptions::NEAREST } else { TextureOptions::LINEAR };
         match &mut self.texture {
-            Some(texture) => texture.set(picture, TextureOptions::NEAREST),
-            none => *none = Some(context.load_texture("picture", picture, TextureOptions::NEAREST)),
+            Some(texture) => texture.set(picture, options),
+            none => *none = Some(context.load_texture("picture", picture, options)),
         }
     }
 
-    /// Seconds since the last frame, and whether that was drawn just before.
+    /// Seconds since the last frame; a pause counts as a short one.
     fn step(&mut self) -> f64 {
         let now = Instant::now();
         let step = self.last.replace(now).map_or(0.0, |last| (now - last).as_secs_f64());
@@ -76,11 +91,17 @@ impl App<'_> {
         let response = ui.allocate_rect(rect, Sense::click_and_drag());
         let step = self.stage.step();
         self.divide(ui, &response, rect);
-        self.steer(ui, &response, (step, push), scale);
-        let frame = self.viewer.frame_if_changed(size);
+        let is_moving = self.steer(ui, &response, (step, push), scale) || self.stage.is_dividing;
+        let coarseness = if is_moving { self.stage.coarseness() } else { 1 };
+        let frame = self.viewer.frame_if_changed(size.map(|side| side.div_ceil(coarseness)));
         self.stage.count(frame.is_some(), step);
         if let Some(frame) = frame {
             self.stage.put(ui.ctx(), &frame);
+            let whole_ms = self.viewer.times_ms().last().filter(|_| coarseness == 1);
+            self.stage.whole_ms = whole_ms.copied().unwrap_or(self.stage.whole_ms);
+        }
+        if is_moving {
+            ui.ctx().request_repaint();
         }
         let whole = Rect::from_min_max(Pos2::ZERO, pos2(1.0, 1.0));
         if let Some(texture) = &self.stage.texture {
@@ -111,7 +132,8 @@ impl App<'_> {
         }
     }
 
-    fn steer(&mut self, ui: &Ui, response: &Response, (step, push): (f64, [f64; 3]), scale: f32) {
+    /// Moves the eye; whether it is in motion.
+    fn steer(&mut self, ui: &Ui, response: &Response, (step, push): (f64, [f64; 3]), scale: f32) -> bool {
         let size = self.stage.size;
         let moved = response.drag_delta() * scale;
         let moved = [moved.x, moved.y].map(f64::from);
@@ -138,9 +160,7 @@ impl App<'_> {
         if response.contains_pointer() {
             self.scroll(ui);
         }
-        if turns || push != [0.0; 3] || self.viewer.orbit().is_moving() {
-            ui.ctx().request_repaint();
-        }
+        turns || pans || push != [0.0; 3] || self.viewer.orbit().is_moving()
     }
 
     /// Wheels and touchpads.
@@ -184,7 +204,7 @@ impl App<'_> {
         painter.vline(x, rect.y_range(), Stroke::new(1.0, style::TEXT));
         painter.circle(pos2(x, rect.center().y), 6.0, style::PANEL, Stroke::new(1.5, style::TEXT));
         let chip = |at: Pos2, align: Align2, side: Side| {
-            let galley = painter.layout_no_wrap(self.name(side), FontId::proportional(13.5), style::TEXT);
+            let galley = painter.layout_no_wrap(self.full_name(side), FontId::proportional(13.5), style::TEXT);
             let text = align.anchor_size(at, galley.size());
             painter.rect_filled(text.expand2(Vec2::new(8.0, 4.0)), 6.0, style::BACKGROUND.gamma_multiply(0.75));
             painter.galley(text.min, galley, style::TEXT);

@@ -27,10 +27,8 @@ impl App<'_> {
         let across = |k: usize| rect.right() - 3.0 - (times.len() - 1 - k) as f32 * rect.width() / 240.0;
         let line = times.iter().enumerate().map(|(k, &ms)| pos2(across(k), height(ms))).collect();
         painter.line(line, Stroke::new(1.5, style::ACCENT));
-        let text = format!(
-            "{median:.1} ms in the median ({:.0} frames/s), {slow:.1} ms at worst of 20",
-            1000.0 / median.max(1e-3)
-        );
+        let rate = 1000.0 / median.max(1e-3);
+        let text = format!("{median:.1} ms ({rate:.0} frames/s), one in 20 above {slow:.1} ms");
         ui.weak(RichText::new(text).small());
     }
 }
