@@ -117,6 +117,8 @@ pub struct Viewer<'a> {
     pub divider: f64,
     /// What shines on materials.
     pub lamp: Lamp,
+    /// They are brightened by so many stops.
+    pub stops: f64,
     seen: Option<Seen>,
     times_ms: Vec<f64>,
     notes: Vec<String>,
@@ -143,7 +145,7 @@ struct Drawn<'a> {
 struct Found {
     exhibit: usize,
     photograph: usize,
-    lamp: Lamp,
+    light: (Lamp, f64),
     pins: Vec<(usize, Pin)>,
     difference: Option<Difference>,
 }
@@ -153,7 +155,7 @@ struct Found {
 struct Seen {
     camera: Camera,
     sides: (Side, Option<Side>, f64),
-    lamp: Lamp,
+    light: (Lamp, f64),
     photograph: Option<usize>,
     pins: Vec<Vec<(usize, Pin)>>,
 }
@@ -186,6 +188,7 @@ impl<'a> Viewer<'a> {
             right: None,
             divider: 0.5,
             lamp: Lamp::WithEye,
+            stops: 0.0,
             seen: None,
             times_ms: Vec::new(),
             notes: Vec::new(),
@@ -274,7 +277,7 @@ impl<'a> Viewer<'a> {
         Seen {
             camera: self.camera(size),
             sides: (self.left, self.right, self.divider),
-            lamp: self.lamp,
+            light: (self.lamp, self.stops),
             photograph: photograph.then(|| self.nearest_photograph()).flatten(),
             pins: self.drawn.iter().map(|drawn| drawn.pins.clone()).collect(),
         }
@@ -346,7 +349,7 @@ impl<'a> Viewer<'a> {
                 Light::directional(self.orbit.direction(azimuth_deg.to_radians(), elevation_deg.to_radians()))
             }
         };
-        Lighting { lights: vec![light], stops: 0.0 }
+        Lighting { lights: vec![light], stops: self.stops as f32 }
     }
 }
 
@@ -385,10 +388,10 @@ impl Viewer<'_> {
         let camera = *self.photographs.as_ref()?.camera(photograph)?;
         let factor = camera.intrinsics.width.max(camera.intrinsics.height).div_ceil(LONGEST_DIFFERENCE).max(1);
         let camera = camera.downscaled(factor);
-        let lamp = self.lamp;
+        let light = (self.lamp, self.stops);
         let is_it = |found: &Found| {
-            let of = (found.exhibit, found.photograph, found.lamp);
-            of == (exhibit, photograph, lamp) && found.pins == self.drawn[exhibit].pins
+            let of = (found.exhibit, found.photograph, found.light);
+            of == (exhibit, photograph, light) && found.pins == self.drawn[exhibit].pins
         };
         if !self.difference.as_ref().is_some_and(is_it) {
             let picture = match self.photographs.as_mut()?.picture(photograph) {
@@ -399,7 +402,7 @@ impl Viewer<'_> {
             let drawn = self.drawn.get_mut(exhibit)?;
             let difference = difference(&drawn.compared().render(&camera, &lighting), &picture, BACKGROUND);
             let pins = drawn.pins.clone();
-            self.difference = Some(Found { exhibit, photograph, lamp, pins, difference });
+            self.difference = Some(Found { exhibit, photograph, light, pins, difference });
         }
         self.difference.as_ref()?.difference.as_ref().map(|found| Ok((camera, found)))
     }

@@ -3,10 +3,14 @@
 use super::{App, style};
 use crate::viewer::Lamp;
 use render::window::egui::{Sense, Slider, Stroke, Ui, Vec2};
+use std::ops::RangeInclusive;
 
 /// Side of the plot, in points, and how high above the plane its rim is, in degrees.
 const SIDE: f32 = 150.0;
 const RIM_DEG: f64 = -30.0;
+
+/// How far materials are brightened.
+const STOPS: RangeInclusive<f64> = -4.0..=6.0;
 
 /// Where a light begins that is taken off the eye.
 const FIRST: [f64; 2] = [-40.0, 45.0];
@@ -28,6 +32,7 @@ impl App<'_> {
             ui.add(Slider::new(elevation_deg, RIM_DEG..=90.0).fixed_decimals(0).suffix("° up"));
         }
         self.viewer.lamp = lamp;
+        ui.add(Slider::new(&mut self.viewer.stops, STOPS).fixed_decimals(1).suffix(" stops"));
     }
 }
 

@@ -92,7 +92,9 @@ impl App<'_> {
         let step = self.stage.step();
         self.divide(ui, &response, rect);
         let is_moving = self.steer(ui, &response, (step, push), scale) || self.stage.is_dividing;
-        let coarseness = if is_moving { self.stage.coarseness() } else { 1 };
+        // A slider that is held, too.
+        let is_changing = is_moving || ui.ctx().egui_is_using_pointer();
+        let coarseness = if is_changing { self.stage.coarseness() } else { 1 };
         let frame = self.viewer.frame_if_changed(size.map(|side| side.div_ceil(coarseness)));
         self.stage.count(frame.is_some(), step);
         if let Some(frame) = frame {
