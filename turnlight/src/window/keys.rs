@@ -2,7 +2,7 @@
 
 use super::App;
 use crate::viewer::Side;
-use render::window::egui::{Context, Grid, Key, Modifiers, RichText, Ui, ViewportCommand};
+use render::window::egui::{Context, Grid, Key, Modifiers, Popup, RichText, Ui, ViewportCommand};
 
 /// Radians, and e-folds of distance, a second that a held key asks for.
 const PUSH: f64 = 1.4;
@@ -34,6 +34,7 @@ const TABLE: [(&str, &str); 15] = [
 ];
 
 pub(super) fn table(ui: &mut Ui) {
+    ui.spacing_mut().interact_size.y = 15.0;
     Grid::new("keys").num_columns(2).spacing([14.0, 4.0]).show(ui, |ui| {
         for (key, does) in TABLE {
             ui.label(RichText::new(key).small());
@@ -46,7 +47,7 @@ pub(super) fn table(ui: &mut Ui) {
 impl App<'_> {
     /// Does what keys say; what held ones ask of the eye.
     pub(super) fn keys(&mut self, context: &Context) -> [f64; 3] {
-        if context.egui_wants_keyboard_input() {
+        if context.egui_wants_keyboard_input() || Popup::is_any_open(context) {
             return [0.0; 3];
         }
         let pressed = |key: Key| context.input_mut(|i| i.consume_key(Modifiers::NONE, key));

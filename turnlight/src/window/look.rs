@@ -4,6 +4,9 @@ use super::App;
 use crate::viewer::Side;
 use render::window::egui::{ComboBox, RichText, Ui};
 
+/// Room for all that a side can show, in points.
+const MENU_HEIGHT: f32 = 480.0;
+
 impl App<'_> {
     pub(super) fn look(&mut self, ui: &mut Ui) {
         let names: Vec<String> = self.viewer.exhibits().iter().map(|exhibit| exhibit.name.clone()).collect();
@@ -29,11 +32,14 @@ impl App<'_> {
     }
 
     fn choose(&self, ui: &mut Ui, salt: &str, side: &mut Side) {
-        ComboBox::from_id_salt(salt).width(92.0).selected_text(self.name(*side)).show_ui(ui, |ui| {
-            for choice in self.sides() {
-                ui.selectable_value(side, choice, self.name(choice));
-            }
-        });
+        ComboBox::from_id_salt(salt).width(92.0).height(MENU_HEIGHT).selected_text(self.name(*side)).show_ui(
+            ui,
+            |ui| {
+                for choice in self.sides() {
+                    ui.selectable_value(side, choice, self.name(choice));
+                }
+            },
+        );
     }
 
     /// All that a side can show.
