@@ -1,6 +1,6 @@
 //! `turnlight view`
 
-use super::{choice, read_file};
+use super::read_file;
 use crate::Answer;
 use crate::arguments::ViewArgs;
 use serde_json::json;
@@ -32,7 +32,7 @@ fn serve(args: &ViewArgs, model: &Path, announce: impl FnOnce(&Answer) -> Result
 
 #[cfg(feature = "window")]
 fn window(args: &ViewArgs) -> Result<(), Error> {
-    use super::read_capture;
+    use super::{choice, read_capture};
     use turnlight::playback;
     use turnlight::viewer::{Exhibit, Viewer, ViewerOptions};
     use turnlight::window::{WindowOptions, show};
