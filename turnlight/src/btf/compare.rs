@@ -4,6 +4,7 @@
 //! fitted once. Each material is judged as it is stored: written, read back, decoded. Numbers are stored
 //! with the same care by all ([`texture::btf::Precision`]).
 
+use super::delta::{Delta, deltas};
 use super::evaluate::{Evaluation, judge};
 use super::sheet;
 use crate::Error;
@@ -60,6 +61,8 @@ pub struct CodecComparison {
     pub precision: &'static str,
     /// The runs, by codec, then ratio.
     pub runs: Vec<CodecRun>,
+    /// Codecs at equal rate, each against each.
+    pub deltas: Vec<Delta>,
 }
 
 /// Compares codecs on `btf`. With a report, pictures of each codec's first run are written there.
@@ -96,6 +99,7 @@ pub fn compare(
             Precision::Full => "full",
             Precision::Compact => "compact",
         },
+        deltas: deltas(&runs),
         runs,
     })
 }
@@ -179,6 +183,11 @@ pub fn text(comparison: &CodecComparison) -> String {
                 writeln!(out, "{}{asked}: {}", run.name, fault.as_deref().unwrap_or("no figures"))
             }
         };
+    }
+    for d in &comparison.deltas {
+        let [from, to] = d.bytes;
+        let range = format!("{from} to {to} bytes");
+        let _ = writeln!(out, "{} over {}, {range}: {:+.3} RMSE, {:+.2} dB", d.codec, d.against, d.rmse, d.psnr_db);
     }
     out
 }

@@ -2,6 +2,7 @@
 //! ([`compare`]).
 
 mod compare;
+mod delta;
 mod evaluate;
 mod page;
 mod plot;
@@ -9,6 +10,7 @@ mod sheet;
 mod speed;
 
 pub use compare::{CodecComparison, CodecRun, CompareOptions, compare, text};
+pub use delta::Delta;
 pub use evaluate::{Evaluation, evaluate};
 pub use page::html;
 pub use sheet::{DIFFERENCE_GAIN, sheet};

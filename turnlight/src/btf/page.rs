@@ -2,7 +2,7 @@
 
 use super::compare::sheet_path;
 use super::plot::{Axis, error_over};
-use super::{CodecComparison, CodecRun, DIFFERENCE_GAIN, Evaluation};
+use super::{CodecComparison, CodecRun, DIFFERENCE_GAIN, Delta, Evaluation};
 use crate::Error;
 use crate::output::OutputFolder;
 use base64::Engine;
@@ -50,6 +50,10 @@ pub fn html(comparison: &CodecComparison, report: &OutputFolder) -> Result<Strin
     push_table(&mut page, &comparison.runs);
     page.push_str("<h2>Error against size</h2>\n");
     page.push_str(&error_over(comparison, Axis::BytesPerTexel)?);
+    if !comparison.deltas.is_empty() {
+        page.push_str("\n<h2>At equal size</h2>\n");
+        push_deltas(&mut page, &comparison.deltas);
+    }
     page.push_str("\n<h2>Error against time</h2>\n");
     page.push_str(&error_over(comparison, Axis::NanosecondsPerAnswer)?);
     page.push_str(&format!("\n<h2>Original, decoded, {DIFFERENCE_GAIN}× difference</h2>\n"));
@@ -72,6 +76,25 @@ fn push_table(page: &mut String, runs: &[CodecRun]) {
                 let fault = run.fault.as_deref().unwrap_or("no figures").replace('<', "&lt;");
                 page.push_str(&format!("<td colspan=\"{}\">{fault}</td>", COLUMNS.len()));
             }
+        }
+        page.push_str("</tr>\n");
+    }
+    page.push_str("</table>\n");
+}
+
+/// RMSE of the codec of the row over that of the column, on average over the sizes both have (Bjøntegaard).
+fn push_deltas(page: &mut String, deltas: &[Delta]) {
+    let mut names: Vec<&str> = deltas.iter().map(|delta| delta.codec).collect();
+    names.dedup();
+    page.push_str("<table><tr><th>RMSE over that of</th>");
+    names.iter().for_each(|name| page.push_str(&format!("<th>{name}</th>")));
+    page.push_str("</tr>\n");
+    for row in &names {
+        page.push_str(&format!("<tr><td>{row}</td>"));
+        for column in &names {
+            let found = deltas.iter().find(|delta| delta.codec == *row && delta.against == *column);
+            let cell = found.map_or_else(|| "–".into(), |d| format!("{:+.2} ({:+.2} dB)", d.rmse, d.psnr_db));
+            page.push_str(&format!("<td>{cell}</td>"));
         }
         page.push_str("</tr>\n");
     }

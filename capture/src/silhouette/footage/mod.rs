@@ -14,6 +14,7 @@
 mod cloth;
 mod cluster;
 mod consensus;
+mod contact;
 mod cut;
 mod decision;
 mod gains;

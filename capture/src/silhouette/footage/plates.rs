@@ -2,6 +2,7 @@
 
 use super::cloth::Cloth;
 use super::cluster::{self, Cluster};
+use super::contact::{Contact, is_print_in};
 use super::light::Toned;
 use super::optics::{Cutout, Directions, on_plane};
 use super::palette::Palettes;
@@ -26,12 +27,12 @@ const SURE: u8 = 6;
 /// Log odds by colour from which on a place beside the hull is the object, not the target.
 const SUSPICIOUS: f32 = 2.0;
 
+/// The same of a place beside one that the object covers in nearly all frames: a foot lies in the dark, where colours say
+/// little.
+const OF_A_FOOT: f32 = -1.0;
+
 /// Of the (encoded) light on the print, what falls on parts of it in the mean of all frames.
 const PRINT_LIGHT: std::ops::RangeInclusive<f32> = 0.5..=1.15;
-
-/// Difference of hue from the print (encoded levels, and as a share of the brightest channel) that is light, too.
-const LEAST_TINT: f32 = 5.0;
-const LARGEST_TINT: f32 = 0.05;
 
 /// A frame that makes plates.
 #[derive(Debug)]
@@ -162,11 +163,17 @@ impl TargetPlate {
             Some(Cluster { colour: [r?, g?, b?], spread: spread?, support: SURE })
         };
         let (Some(paper), Some(ink)) = (seen(0.0), seen(1.0)) else { return };
-        for (texel, dark) in self.texture.pixels_mut().iter_mut().zip(&dark) {
-            let Some(dark) = *dark else { continue };
-            let colour = [0, 1, 2].map(|c| paper.colour[c] + (ink.colour[c] - paper.colour[c]) * dark);
+        let printed: Vec<Option<[f32; 3]>> = dark
+            .iter()
+            .map(|dark| dark.map(|d| [0, 1, 2].map(|c| paper.colour[c] + (ink.colour[c] - paper.colour[c]) * d)))
+            .collect();
+        let contact = Contact::of(&self.texture, &printed);
+        for (at, (texel, printed)) in self.texture.pixels_mut().iter_mut().zip(&printed).enumerate() {
+            let Some(printed) = *printed else { continue };
+            let light = contact.at(at % width, at / width);
+            let colour = printed.map(|v| v * light);
             let is_seen = texel.support >= SURE && !texel.is_covered();
-            if !is_seen || !is_like_print(&texel.colour, &colour) {
+            if !is_seen || !is_print_in(&texel.colour, &colour, &PRINT_LIGHT) {
                 *texel = Cluster { colour, spread: paper.spread.max(ink.spread), support: SURE };
             }
         }
@@ -253,17 +260,31 @@ impl TargetPlate {
             if 3 * usize::from(found.support) < samples.len() { Cluster::default() } else { found }
         };
         let pixels = (0..width * height).into_par_iter().map_init(Vec::new, texel).collect();
-        Image::from_pixels(width, height, pixels).unwrap_or_default()
+        let mut seen = Image::from_pixels(width, height, pixels).unwrap_or_default();
+        cover_feet(&mut seen, palettes);
+        seen
     }
 }
 
-/// Whether a colour is that of the print in some light.
-pub(super) fn is_like_print(colour: &[f32; 3], print: &[f32; 3]) -> bool {
-    let dot = |b: &[f32; 3]| (0..3).map(|c| b[c] * print[c]).sum::<f32>();
-    let light = dot(colour) / dot(print).max(1.0);
-    let brightest = print[0].max(print[1]).max(print[2]);
-    let is_same_hue = (0..3).all(|c| (colour[c] - light * print[c]).abs() < LEAST_TINT + LARGEST_TINT * brightest);
-    is_same_hue && PRINT_LIGHT.contains(&light)
+/// Where a place is covered, what is beside it and has the object's colours is the object, too: a foot that the hull so
+/// far does not reach.
+pub(super) fn cover_feet(seen: &mut Image<Cluster>, palettes: &Palettes) {
+    let (width, height) = (seen.width(), seen.height());
+    let mut open: Vec<usize> = (0..width * height).filter(|&at| seen.pixels()[at].is_covered()).collect();
+    while let Some(at) = open.pop() {
+        let (x, y) = (at % width, at / width);
+        let left = (x > 0).then(|| at - 1);
+        let right = (x + 1 < width).then(|| at + 1);
+        let above = (y > 0).then(|| at - width);
+        let below = (y + 1 < height).then(|| at + width);
+        for next in [left, right, above, below].into_iter().flatten() {
+            let texel = &mut seen.pixels_mut()[next];
+            if !texel.is_covered() && palettes.log_odds(&texel.colour) > OF_A_FOOT {
+                *texel = Cluster::COVERED;
+                open.push(next);
+            }
+        }
+    }
 }
 
 fn median(mut values: Vec<f32>) -> Option<f32> {

@@ -20,6 +20,12 @@ const MARGIN: f64 = 12.0;
 /// Colours a frame adds to the palette, at most.
 const PALETTE_SAMPLES: usize = 2000;
 
+/// Of the (encoded) light on what is around the object, what its shadow may leave.
+const SHADES: [f32; 5] = [0.5, 0.6, 0.7, 0.8, 0.9];
+
+/// Reach of the blur that takes the noise of single pixels from odds, pixels (standard deviation).
+const EVEN: f64 = 1.1;
+
 /// Frames at one size, and what is known of them.
 #[derive(Clone, Copy)]
 pub(super) struct Scene<'a> {
@@ -171,8 +177,11 @@ impl Scene<'_> {
             .map(|i| (self.fetch)(i).map(|image| self.part(i, &image, belief, &plates, cutouts[i], round)))
             .collect();
         let parts: Vec<Part> = parts.into_iter().collect::<Result<_, _>>()?;
-        let [object, surroundings] =
-            [0, 1].map(|side| Palette::learned(parts.iter().flat_map(|p: &Part| p.colours[side].iter().copied())));
+        let seen = |side: usize| parts.iter().flat_map(move |p: &Part| p.colours[side].iter().copied());
+        let object = Palette::learned(seen(0));
+        // Under the object nothing else is seen of what is around it than its shade.
+        let in_shade = seen(1).enumerate().map(|(i, colour)| colour.map(|v| v * SHADES[i % SHADES.len()]));
+        let surroundings = Palette::learned(seen(1).chain(in_shade));
         let palettes = Palettes { object, surroundings };
         Ok(judgement::agreed(parts, belief, palettes, round.resolution, round.dissent))
     }
@@ -238,11 +247,16 @@ impl Scene<'_> {
         let room = self.setup.segments[i].and_then(|s| plates.rooms[s].as_ref()).map(|r| cutout.of(r));
         let target = target.as_ref().map(|(seen, shade)| (seen, shade));
         let hull = hull.filter(|_| !round.is_guess);
-        let nearby = hull.as_ref().map(|h| Nearby::of(&picture, h, longest));
         let size = (cutout.width, cutout.height);
-        let odds = odds::of(&picture, room.as_ref(), target, &belief.palettes, nearby.as_ref(), size);
+        let odds_given =
+            |nearby: Option<&Nearby>| odds::of(&picture, room.as_ref(), target, &belief.palettes, nearby, size);
+        let nearby = hull.as_ref().map(|h| {
+            let unexplained = without_explained(h, &blur(&odds_given(None).log_odds, EVEN));
+            Nearby::of(&picture, &unexplained, longest)
+        });
+        let odds = odds_given(nearby.as_ref());
         // Without the noise of single pixels.
-        let even = blur(&odds.log_odds, 1.1);
+        let even = blur(&odds.log_odds, EVEN);
         let Some(hull) = hull else {
             let matte = decision::guessed(&even);
             let colours = colours(&picture, &even, &matte);
@@ -259,6 +273,13 @@ impl Scene<'_> {
 /// Of a frame, in pixels.
 fn longest_side(camera: &Camera) -> usize {
     camera.intrinsics.width.max(camera.intrinsics.height)
+}
+
+/// The hull without what is likelier background: a gap between legs that it does not show is not to say what colours
+/// the legs have.
+fn without_explained(hull: &Image<u8>, log_odds: &Image<f32>) -> Image<u8> {
+    let pixels = hull.pixels().iter().zip(log_odds.pixels()).map(|(&h, &l)| if l < 0.0 { 0 } else { h });
+    Image::from_pixels(hull.width(), hull.height(), pixels.collect()).unwrap_or_default()
 }
 
 /// Of pixels that are object, and background, by themselves and not at its edge.

@@ -385,7 +385,7 @@ fn a_foot_is_not_taken_for_the_print_beside_it() {
         ([70.0, 62.0, 55.0], ink, false),
         ([180.0, 60.0, 50.0], paper, false),
     ] {
-        assert_eq!(plates::is_like_print(&seen, &print), is_print, "{seen:?} on {print:?}");
+        assert_eq!(contact::is_print_in(&seen, &print, &(0.5..=1.15)), is_print, "{seen:?} on {print:?}");
     }
 }
 
@@ -422,5 +422,53 @@ fn a_hole_is_filled_where_the_object_has_the_colour_seen_in_it() {
         let mask = decision::decided(&picture, &odds, &hull, 0.5, Some(&palette));
         assert_eq!(mask.at(20, 20) == 255, is_filled, "{shown:?}");
         assert_eq!((mask.at(10, 20), mask.at(3, 20)), (255, 0));
+    }
+}
+
+/// Paper and ink in the shadow of something round; where it stands nothing is seen.
+#[test]
+fn shadow_that_turns_with_the_target_is_known_where_little_of_it_is_seen() {
+    let (paper, ink) = ([210.0, 208.0, 200.0], [42.0, 42.0, 40.0]);
+    let shadow = |x: usize, y: usize| {
+        let squared = (x as f32 - 60.0).powi(2) + (y as f32 - 60.0).powi(2);
+        1.0 - 0.7 * (-0.5 * squared / 400.0).exp()
+    };
+    let places = || (0..120).flat_map(|y| (0..120).map(move |x| (x, y)));
+    let print = |x: usize, y: usize| if (x / 12 + y / 12) % 2 == 0 { paper } else { ink };
+    let hidden = |x: usize, y: usize| (50..70).contains(&x) && (54..66).contains(&y);
+    let texel = |(x, y): (usize, usize)| match hidden(x, y) {
+        true => cluster::Cluster::COVERED,
+        false => cluster::Cluster { colour: print(x, y).map(|v| v * shadow(x, y)), spread: 3.0, support: 9 },
+    };
+    let seen = Image::from_pixels(120, 120, places().map(texel).collect()).unwrap();
+    let printed: Vec<_> = places().map(|(x, y)| Some(print(x, y))).collect();
+    let light = contact::Contact::of(&seen, &printed);
+    for (x, y) in places() {
+        let (found, truth) = (light.at(x, y), shadow(x, y));
+        assert!((found - truth).abs() < 0.12, "{x}, {y}: {found} for {truth}");
+    }
+    // Nothing seen, nothing printed: as in the open.
+    let unknown = contact::Contact::of(&Image::filled(20, 20, cluster::Cluster::COVERED), &vec![Some(paper); 400]);
+    assert_eq!(unknown.at(10, 10), 1.0);
+}
+
+/// A red foot at whose place no frame saw the target: the covered place grows over it, not over paper in shade.
+#[test]
+fn a_foot_beside_a_covered_place_is_not_taken_for_the_target() {
+    let (red, paper) = ([120.0, 20.0, 25.0], [200.0, 198.0, 190.0]);
+    let samples = |colour: [f32; 3]| std::iter::repeat_n(colour, 8000);
+    let palettes = palette::Palettes {
+        object: palette::Palette::learned(samples(red)),
+        surroundings: palette::Palette::learned(samples(paper).chain(samples(paper.map(|v| v * 0.7)))),
+    };
+    let plain = |colour: [f32; 3]| cluster::Cluster { colour, spread: 3.0, support: 9 };
+    let mut seen = Image::filled(20, 5, plain(paper.map(|v| v * 0.7)));
+    (0..5).for_each(|y| (6..10).for_each(|x| seen.set(x, y, plain(red))));
+    (0..5).for_each(|y| (10..14).for_each(|x| seen.set(x, y, cluster::Cluster::COVERED)));
+    // What is red elsewhere is printed on the target.
+    seen.set(1, 1, plain(red));
+    plates::cover_feet(&mut seen, &palettes);
+    for x in 0..20 {
+        assert_eq!(seen.at(x, 1).is_covered(), (6..14).contains(&x), "{x}");
     }
 }

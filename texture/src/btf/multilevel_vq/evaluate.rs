@@ -85,7 +85,8 @@ impl Tables {
     pub(super) fn place(&self, books: &Books, light: &Vector3<f32>, view: &Vector3<f32>) -> Place {
         let [theta, phi] = books.grid.view_place(view);
         let seen = |phi: usize| books.grid.light_place(&turned(light, self.turns[phi]));
-        Place { theta, phi, light: phi.nodes().map(seen) }
+        let [from, to] = phi.nodes();
+        Place { theta, phi, light: [seen(from), seen(to)] }
     }
 
     /// The entry of P3 of a texel's item at a node of the view, and the product of its scales.

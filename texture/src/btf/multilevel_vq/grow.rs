@@ -71,6 +71,8 @@ pub(super) struct Growing {
     /// P3: `theta` entries an item; the squared length of its luminance.
     pub(super) views: Vec<Link>,
     pub(super) view_energies: Vec<f32>,
+    /// Per polar angle, what the entries of P3 stand for, gains weighted.
+    view_parts: Vec<Vec<Part>>,
     /// P4: `phi` entries an item.
     pub(super) texels: Vec<Link>,
 }
@@ -112,6 +114,7 @@ impl Growing {
             known_pairs: BTreeMap::new(),
             views: Vec::new(),
             view_energies: Vec::new(),
+            view_parts: vec![Vec::new(); grid.theta],
             texels: Vec::new(),
         }
     }
@@ -175,13 +178,30 @@ impl Growing {
         let slices = first..first + self.grid.theta;
         let parts: Vec<Link> = slices.clone().map(|slice| self.encode_pair(query, slice, accept, growth)).collect();
         let (item, scale) = normalised(&parts);
-        let built = self.decode(&self.view_parts(&item, scale).collect::<Vec<_>>());
+        let built = self.decode(&self.entry_parts(&item, scale).collect::<Vec<_>>());
         let error = accept.error(self.grid, self.patch(query, slices), built.as_patch(&self.weights));
         keep(found, error).unwrap_or_else(|| {
-            self.view_energies.push(self.view_energy(&item));
-            self.views.extend(&item);
+            self.push_view(&item);
             Link { child: self.view_count() as u32 - 1, scale }
         })
+    }
+
+    /// Appends an item to P3.
+    fn push_view(&mut self, item: &[Link]) {
+        self.view_energies.push(self.view_energy(item));
+        let parts: Vec<Part> = self.entry_parts(item, 1.0).collect();
+        for ((known, part), weight) in self.view_parts.iter_mut().zip(parts).zip(&self.weights) {
+            known.push(Part { gain: weight * part.gain, ..part });
+        }
+        self.views.extend(item);
+    }
+
+    /// Works out anew what is known of the items of P3 once their entries have changed.
+    pub(super) fn renew_views(&mut self) {
+        let views = std::mem::take(&mut self.views);
+        self.view_energies.clear();
+        self.view_parts.iter_mut().for_each(Vec::clear);
+        views.chunks_exact(self.grid.theta).for_each(|item| self.push_view(item));
     }
 
     /// The item of M that stands for the light's hemisphere under one view.
@@ -354,7 +374,7 @@ impl Growing {
         best(accept.shortlist(costs).into_iter().map(|item| {
             let link = Link { child: item as u32, scale: query.sums[phi][item][0] / self.view_energies[item] };
             let links = &self.views[item * self.grid.theta..][..self.grid.theta];
-            let decoded = self.decode(&self.view_parts(links, link.scale).collect::<Vec<_>>());
+            let decoded = self.decode(&self.entry_parts(links, link.scale).collect::<Vec<_>>());
             let patch = self.patch(query, slices.clone());
             (link, accept.error(self.grid, patch, decoded.as_patch(&self.weights)))
         }))
@@ -376,7 +396,7 @@ impl Growing {
 
     /// The squared length of an item of P3.
     pub(super) fn view_energy(&self, links: &[Link]) -> f32 {
-        self.view_parts(links, 1.0).zip(&self.weights).map(|(part, weight)| weight * part.gain * part.gain).sum()
+        self.entry_parts(links, 1.0).zip(&self.weights).map(|(part, weight)| weight * part.gain * part.gain).sum()
     }
 
     /// How much a slice counts.
@@ -395,7 +415,7 @@ impl Growing {
     }
 
     /// What the entries of an item of P3 stand for.
-    fn view_parts<'a>(&'a self, links: &'a [Link], scale: f32) -> impl Iterator<Item = Part> + 'a {
+    fn entry_parts<'a>(&'a self, links: &'a [Link], scale: f32) -> impl Iterator<Item = Part> + 'a {
         links.iter().map(move |link| {
             let [luma, color] = self.pairs[link.child as usize];
             Part { luma, color, gain: scale * link.scale * self.lengths[luma as usize] }
@@ -406,7 +426,7 @@ impl Growing {
     pub(super) fn decode_texel(&self, links: &[Link], scale: f32) -> Texel {
         let views = |link: &Link| {
             let item = &self.views[link.child as usize * self.grid.theta..][..self.grid.theta];
-            self.view_parts(item, scale * link.scale).collect::<Vec<_>>()
+            self.entry_parts(item, scale * link.scale).collect::<Vec<_>>()
         };
         self.decode(&links.iter().flat_map(views).collect::<Vec<_>>())
     }
@@ -458,37 +478,51 @@ impl Query {
 
     /// Looks up what the books have gained since the last time.
     pub(super) fn refresh(&mut self, books: &Growing) {
-        if books.slice_count() >= self.dots[0].len() + FEW && self.dots.iter().all(|d| d.len() == self.dots[0].len()) {
-            let cells = books.grid.cells();
-            let found = products(&books.units[self.dots[0].len() * cells..], &self.texel.luma, cells);
-            let columns = found.chunks_exact(found.len() / self.dots.len());
-            self.dots.iter_mut().zip(columns).for_each(|(dots, new)| dots.extend(new));
+        Self::refresh_all(std::slice::from_mut(self), books);
+    }
+
+    /// The same for several texels, as one matrix.
+    pub(super) fn refresh_all(queries: &mut [Self], books: &Growing) {
+        let cells = books.grid.cells();
+        let columns = queries.len() * books.grid.nodes();
+        let together = |length: fn(&Self) -> &[Vec<f32>]| {
+            let mut lengths = queries.iter().flat_map(length).map(Vec::len);
+            let first = lengths.next().unwrap_or_default();
+            lengths.all(|length| length == first).then_some(first)
+        };
+        let [known_slices, known_colors] = [together(|q| &q.dots), together(|q| &q.gaps)];
+        if let Some(known) = known_slices.filter(|known| books.slice_count() >= known + FEW) {
+            let slices: Vec<f32> = queries.iter().flat_map(|q| &q.texel.luma).copied().collect();
+            let found = products(&books.units[known * cells..], &slices, cells);
+            let new = found.chunks_exact(found.len() / columns);
+            queries.iter_mut().flat_map(|q| &mut q.dots).zip(new).for_each(|(dots, new)| dots.extend(new));
         }
-        let known = self.gaps[0].len();
-        if books.color_energies.len() >= known + FEW && self.gaps.iter().all(|g| g.len() == known) {
-            let values = 2 * books.grid.cells();
-            let found = products(&books.color_values[known * values..], &self.texel.chroma, values);
-            let columns = found.chunks_exact(found.len() / self.gaps.len());
-            for ((gaps, new), own) in self.gaps.iter_mut().zip(columns).zip(&self.color_energies) {
-                gaps.extend(
-                    new.iter().zip(&books.color_energies[known..]).map(|(dot, e)| (own + e - 2.0 * dot).max(0.0)),
-                );
+        if let Some(known) = known_colors.filter(|known| books.color_energies.len() >= known + FEW) {
+            let slices: Vec<f32> = queries.iter().flat_map(|q| &q.texel.chroma).copied().collect();
+            let found = products(&books.color_values[known * 2 * cells..], &slices, 2 * cells);
+            let new = found.chunks_exact(found.len() / columns);
+            let gaps = queries.iter_mut().flat_map(|q| q.gaps.iter_mut().zip(&q.color_energies));
+            for ((gaps, own), new) in gaps.zip(new) {
+                let items = new.iter().zip(&books.color_energies[known..]);
+                gaps.extend(items.map(|(dot, e)| (own + e - 2.0 * dot).max(0.0)));
             }
         }
-        (0..books.grid.phi).for_each(|phi| self.refresh_view(books, phi));
+        for query in queries {
+            (0..books.grid.phi).for_each(|phi| query.refresh_view(books, phi));
+        }
     }
 
     fn refresh_view(&mut self, books: &Growing, phi: usize) {
         let theta = books.grid.theta;
         (phi * theta..(phi + 1) * theta).for_each(|slice| self.refresh_slice(books, slice));
-        for item in self.sums[phi].len()..books.view_count() {
-            let parts = books.view_parts(&books.views[item * theta..][..theta], 1.0);
-            let [mut product, mut gap] = [0.0; 2];
-            for ((part, slice), weight) in parts.zip(phi * theta..).zip(&books.weights) {
-                product += weight * part.gain * self.dots[slice][part.luma as usize];
-                gap += weight * self.gaps[slice][part.color as usize];
+        let known = self.sums[phi].len();
+        self.sums[phi].resize(books.view_count(), [0.0; 2]);
+        for (k, (parts, weight)) in books.view_parts.iter().zip(&books.weights).enumerate() {
+            let (dots, gaps) = (&self.dots[phi * theta + k], &self.gaps[phi * theta + k]);
+            for (sums, part) in self.sums[phi][known..].iter_mut().zip(&parts[known..]) {
+                sums[0] += part.gain * dots[part.luma as usize];
+                sums[1] += weight * gaps[part.color as usize];
             }
-            self.sums[phi].push([product, gap]);
         }
     }
 
@@ -511,6 +545,7 @@ pub(super) fn products(items: &[f32], slices: &[f32], length: usize) -> Vec<f32>
     let columns = |all: &[f32]| all.len() / length;
     let items_view = DMatrixView::from_slice(items, length, columns(items));
     let slices_view = DMatrixView::from_slice(slices, length, columns(slices));
+    // Transposed in place of a view with strides: of few rows nalgebra 0.35 reads those beyond their end.
     (items_view.transpose() * slices_view).data.into()
 }
 

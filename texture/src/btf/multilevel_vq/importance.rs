@@ -28,6 +28,9 @@ pub(super) struct Distributions {
     slices: Vec<f32>,
     /// Per item of P1, `n_β` upper ends.
     rows: Vec<f32>,
+    /// The same as shares.
+    slice_shares: Vec<f32>,
+    row_shares: Vec<f32>,
 }
 
 impl Distributions {
@@ -47,10 +50,9 @@ impl Distributions {
             };
             cumulative(&links.iter().enumerate().map(mass).collect::<Vec<_>>())
         };
-        Self {
-            slices: books.slices.links.chunks_exact(grid.alpha).flat_map(slice).collect(),
-            rows: rows.iter().flat_map(|row| cumulative(row)).collect(),
-        }
+        let slices: Vec<f32> = books.slices.links.chunks_exact(grid.alpha).flat_map(slice).collect();
+        let rows: Vec<f32> = rows.iter().flat_map(|row| cumulative(row)).collect();
+        Self { slice_shares: shares(&slices, grid.alpha), row_shares: shares(&rows, grid.beta), slices, rows }
     }
 }
 
@@ -74,18 +76,22 @@ fn cumulative(masses: &[f32]) -> Vec<f32> {
     ends
 }
 
-/// The cell in which `u` falls, its share, and how far `u` is into it.
-#[inline]
-fn invert(ends: &[f32], u: f32) -> (usize, f32, f32) {
-    let cell = ends.iter().filter(|end| **end <= u).count().min(ends.len() - 1);
-    let mass = share(ends, cell);
-    let start = ends[cell] - mass;
-    (cell, mass, ((u - start) / mass).clamp(0.0, 1.0))
+/// What falls into each cell of items of so many upper ends.
+fn shares(ends: &[f32], width: usize) -> Vec<f32> {
+    let of_item = |ends: &[f32]| -> Vec<f32> {
+        let starts = std::iter::once(&0.0).chain(ends);
+        ends.iter().zip(starts).map(|(end, start)| end - start).collect()
+    };
+    ends.chunks_exact(width).flat_map(of_item).collect()
 }
 
+/// The cell in which `u` falls, and how far it is into it.
 #[inline]
-fn share(ends: &[f32], cell: usize) -> f32 {
-    ends[cell] - if cell == 0 { 0.0 } else { ends[cell - 1] }
+fn invert(ends: &[f32], u: f32) -> (usize, f32) {
+    let cell = ends.iter().map(|end| u32::from(*end <= u)).sum::<u32>() as usize;
+    let cell = cell.min(ends.len() - 1);
+    let start = if cell == 0 { 0.0 } else { ends[cell - 1] };
+    (cell, ((u - start) / (ends[cell] - start)).clamp(0.0, 1.0))
 }
 
 impl MultilevelVq {
@@ -94,52 +100,47 @@ impl MultilevelVq {
     pub fn sample(&self, texel: usize, view: &Vector3<f32>, u: [f32; 3]) -> (Vector3<f32>, f32) {
         let grid = self.books.grid;
         let [theta, phi] = grid.view_place(view);
-        let ([p, t], _) = drawn(phi, theta, u[2]);
-        let ends = self.slice_ends(texel, [phi.nodes()[p], theta.nodes()[t]]);
-        let (slice, _, into_slice) = invert(ends.0, u[0]);
-        let (cell, _, into_cell) = invert(self.row_ends(ends.1 + slice), u[1]);
+        let starts = self.starts(texel, theta, phi);
+        let [p, t] = drawn(phi, theta, u[2]);
+        let (slice, into_slice) = invert(&self.distributions.slices[starts[p][t]..][..grid.alpha], u[0]);
+        let row = self.tables.slices[starts[p][t] + slice].child as usize;
+        let (cell, into_cell) = invert(&self.distributions.rows[row..][..grid.beta], u[1]);
         let alpha = PI * (slice as f32 + into_slice) / grid.alpha as f32 - FRAC_PI_2;
         let s = 2.0 * (cell as f32 + into_cell) / grid.beta as f32 - 1.0;
         let [cos, sin] = self.tables.turn(phi.nodes()[p]);
         let light = turned(&grid.direction(alpha, s), [cos, -sin]);
-        (light, self.density(texel, &light, theta, phi))
+        (light, self.density(starts, &light, theta, phi))
     }
 
     /// The density per steradian with which [`MultilevelVq::sample`] draws a direction above the surface.
     pub fn pdf(&self, texel: usize, view: &Vector3<f32>, light: &Vector3<f32>) -> f32 {
         let [theta, phi] = self.books.grid.view_place(view);
-        self.density(texel, light, theta, phi)
+        self.density(self.starts(texel, theta, phi), light, theta, phi)
+    }
+
+    /// Where a texel's slices start at the four nodes about a view, (azimuth, polar angle).
+    #[inline]
+    fn starts(&self, texel: usize, theta: Between, phi: Between) -> [[usize; 2]; 2] {
+        let link = self.plane().link(texel);
+        let start = |phi, theta| self.tables.view(&self.books, link, [phi, theta]).0.slices as usize;
+        let ([from, to], [low, high]) = (phi.nodes(), theta.nodes());
+        [[start(from, low), start(from, high)], [start(to, low), start(to, high)]]
     }
 
     #[inline]
-    fn density(&self, texel: usize, light: &Vector3<f32>, theta: Between, phi: Between) -> f32 {
+    fn density(&self, starts: [[usize; 2]; 2], light: &Vector3<f32>, theta: Between, phi: Between) -> f32 {
         let grid = self.books.grid;
         let mut sum = 0.0;
-        for p in 0..2 {
-            let node = phi.nodes()[p];
+        for (p, node) in phi.nodes().into_iter().enumerate() {
             let [slice, cell] = cell_of(grid, &turned(light, self.tables.turn(node)));
             for t in 0..2 {
-                let weight = phi.weights()[p] * theta.weights()[t];
-                let (slices, first) = self.slice_ends(texel, [node, theta.nodes()[t]]);
-                sum += weight * share(slices, slice) * share(self.row_ends(first + slice), cell);
+                let entry = starts[p][t] + slice;
+                let row = self.tables.slices[entry].child as usize;
+                let shares = self.distributions.slice_shares[entry] * self.distributions.row_shares[row + cell];
+                sum += phi.weights()[p] * theta.weights()[t] * shares;
             }
         }
         sum * grid.cells() as f32 / TAU
-    }
-
-    /// The upper ends of a texel's slices at a node of the view, and where they start.
-    #[inline]
-    fn slice_ends(&self, texel: usize, node: [usize; 2]) -> (&[f32], usize) {
-        let (view, _) = self.tables.view(&self.books, self.plane().link(texel), node);
-        let first = view.slices as usize;
-        (&self.distributions.slices[first..first + self.books.grid.alpha], first)
-    }
-
-    /// The upper ends of the cells of an entry of P2.
-    #[inline]
-    fn row_ends(&self, entry: usize) -> &[f32] {
-        let first = self.tables.slices[entry].child as usize;
-        &self.distributions.rows[first..first + self.books.grid.beta]
     }
 
     /// The texels of what is shown.
@@ -150,10 +151,9 @@ impl MultilevelVq {
 
 /// One of the four corners between two nodes of two axes, by its weight.
 #[inline]
-fn drawn(slow: Between, fast: Between, u: f32) -> ([usize; 2], f32) {
-    let i = usize::from(u < slow.t);
-    let rest = if i == 1 { u / slow.t } else { (u - slow.t) / (1.0 - slow.t) };
-    ([i, usize::from(rest < fast.t)], rest)
+fn drawn(slow: Between, fast: Between, u: f32) -> [usize; 2] {
+    let [start, width] = if u < slow.t { [0.0, slow.t] } else { [slow.t, 1.0 - slow.t] };
+    [usize::from(u < slow.t), usize::from(u - start < fast.t * width)]
 }
 
 /// The cell of a light as seen from azimuth 0.

@@ -20,6 +20,7 @@
 //! | `color` | luminance and chroma |
 //! | `measure`, `search` | when an item stands for a slice; the nearest one |
 //! | `options` | budgets, phases, thresholds |
+//! | `size` | the threshold of a size |
 //! | `grow`, `refine` | the nest, grown texel by texel; its items made means |
 //! | `books` | few bits, and the file |
 //! | `evaluate`, `importance` | a sample; a direction |
@@ -53,6 +54,7 @@ mod options;
 mod refine;
 mod resample;
 mod search;
+mod size;
 
 pub use grid::{Axis, Grid};
 pub use grow::Growth;
@@ -73,28 +75,23 @@ use options::progressive_order;
 use rayon::prelude::*;
 use refine::{Revised, Sums};
 use resample::{Resampler, Texel};
+use size::Search;
 use std::sync::Arc;
 
-/// Texels resampled as one matrix.
+/// Texels resampled, or compared, as one matrix.
 const BLOCK: usize = 8;
-/// Texels in memory at a time.
+/// Texels compared at a time.
 const BATCH: usize = 4 * BLOCK;
+/// Resampled texels are held up to so many numbers (1.5 GB); beyond, they are resampled whenever they are asked for.
+const HELD: usize = 400_000_000;
 /// Shares of smaller tiles count as those of so many texels: a handful of texels fills no books.
 const SMALL_TILE: usize = 3200;
-/// Rounds of the search for a threshold.
-const ROUNDS: usize = 12;
 /// A ratio may be exceeded by this share.
 const RATIO_TOLERANCE: f64 = 0.03;
-/// Of the bytes that refining saved, the share that is given out again: larger books save less.
-const GIVEN_OUT: f64 = 0.85;
-/// Beyond any logarithm of a ratio of sizes.
-const OVER_BUDGET: f64 = 1e3;
-/// The first threshold tried.
+/// The first threshold tried, of this ratio, and the power of other ratios by which theirs differs.
 const FIRST_THRESHOLD: f64 = 16.0;
-/// A size falls by about this power of the threshold.
-const USUAL_SLOPE: f64 = 3.5;
-/// Thresholds searched, in levels or in hundredths of `1 − SSIM`.
-const THRESHOLDS: [f64; 2] = [0.02, 200.0];
+const FIRST_RATIO: f64 = 100.0;
+const FIRST_POWER: f64 = 0.3;
 /// Encoded samples go by about this root of radiance: 2.4 with a linear toe.
 const SRGB_POWER: f32 = 2.2;
 
@@ -137,44 +134,33 @@ pub fn fit_shared(btfs: &[Btf], options: &Options) -> Result<(MultilevelVq, FitR
     let inputs = btfs.iter().map(|btf| Input::new(btf, options)).collect::<Result<Vec<_>, _>>()?;
     let mut report = FitReport::default();
     let refined = match options.aim {
-        Aim::Threshold(threshold) => Grown::new(&inputs, options, threshold).refined(&inputs, options),
-        Aim::Ratio(ratio) => fit_ratio(btfs, &inputs, options, ratio, &mut report),
+        Aim::Threshold(threshold) => Some(Grown::new(&inputs, options, threshold).refined(&inputs, options)),
+        Aim::Ratio(ratio) => {
+            let most = btfs.iter().map(Btf::raw_bytes).sum::<u64>() as f64 / ratio;
+            let bytes = |grown: &Grown| byte_count(first, &grown.codec(first, &inputs, options)) as f64;
+            let from = FIRST_THRESHOLD * (ratio / FIRST_RATIO).powf(FIRST_POWER);
+            Search::new(&inputs, options, &bytes, from).refined([most / (1.0 + RATIO_TOLERANCE), most], &mut report)
+        }
         Aim::Entries(count) => {
             let entries = |grown: &Grown| grown.books.texel_count() as f64;
             let range = [0.9 * count as f64, count as f64];
-            let grow = |threshold: f64| Grown::new(&inputs, options, threshold);
-            search_threshold(range, FIRST_THRESHOLD, entries, grow, &mut report).refined(&inputs, options)
+            let found = Search::new(&inputs, options, &entries, FIRST_THRESHOLD).within(range, &mut report);
+            found.map(|(grown, _)| grown.refined(&inputs, options))
         }
     };
+    let refined = refined.unwrap_or_else(|| Grown::new(&inputs, options, FIRST_THRESHOLD).refined(&inputs, options));
     let codec = refined.codec(first, &inputs, options);
     let sizes: Vec<String> = codec.entries().iter().map(|(book, count)| format!("{book} {count}")).collect();
     report.notes.push(format!("items: {}", sizes.join(", ")));
     Ok((codec, report))
 }
 
-/// The books of a ratio. Refining leaves some items without use: what they took is given out once more.
-fn fit_ratio(btfs: &[Btf], inputs: &[Input<'_>], options: &Options, ratio: f64, report: &mut FitReport) -> Grown {
-    let most = btfs.iter().map(Btf::raw_bytes).sum::<u64>() as f64 / ratio;
-    let bytes = |grown: &Grown| byte_count(&btfs[0], &grown.codec(&btfs[0], inputs, options)) as f64;
-    let mut search = |most: f64, from: f64| {
-        let grow = |threshold: f64| Grown::new(inputs, options, threshold);
-        search_threshold([most / (1.0 + RATIO_TOLERANCE), most], from, bytes, grow, report)
-    };
-    let grown = search(most, FIRST_THRESHOLD);
-    let (threshold, before) = (grown.threshold, bytes(&grown));
-    let refined = grown.refined(inputs, options);
-    let left = 1.0 + GIVEN_OUT * (most / bytes(&refined) - 1.0);
-    if before > most || left < 1.0 + RATIO_TOLERANCE {
-        return refined;
-    }
-    let again = search(before * left, threshold * left.powf(-1.0 / USUAL_SLOPE)).refined(inputs, options);
-    if bytes(&again) <= most { again } else { refined }
-}
-
 /// A material, and the way to its texels.
 struct Input<'a> {
     btf: &'a Btf,
     resampler: Resampler,
+    /// All texels on the grid, where they are few enough to be held.
+    held: Vec<Texel>,
     /// Texels in the order in which they are coded.
     order: Vec<usize>,
     /// The same at half the size and on, one texel the last.
@@ -189,8 +175,24 @@ impl<'a> Input<'a> {
             true => std::iter::successors(halve(btf), halve).collect(),
             false => Vec::new(),
         };
-        Ok(Self { btf, resampler, order: progressive_order(btf.width, btf.height, options.seed), smaller })
+        let held = match 3 * btf.texels() * options.grid.nodes() * options.grid.cells() <= HELD {
+            true => resampled(&resampler, btf, &(0..btf.texels()).collect::<Vec<_>>()),
+            false => Vec::new(),
+        };
+        Ok(Self { btf, resampler, held, order: progressive_order(btf.width, btf.height, options.seed), smaller })
     }
+
+    /// Some texels on the grid.
+    fn texels(&self, texels: &[usize]) -> Vec<Texel> {
+        match self.held.is_empty() {
+            true => resampled(&self.resampler, self.btf, texels),
+            false => texels.iter().map(|&t| self.held[t].clone()).collect(),
+        }
+    }
+}
+
+fn resampled(resampler: &Resampler, btf: &Btf, texels: &[usize]) -> Vec<Texel> {
+    texels.par_chunks(BLOCK).flat_map_iter(|block| resampler.texels(btf, block)).collect()
 }
 
 /// Books, and what they say of each texel.
@@ -230,7 +232,8 @@ impl Grown {
             for btf in &input.smaller {
                 let mut found = vec![Link::default(); btf.texels()];
                 let texels: Vec<usize> = (0..btf.texels()).collect();
-                let small = Input { btf, resampler: input.resampler.clone(), order: Vec::new(), smaller: Vec::new() };
+                let resampler = input.resampler.clone();
+                let small = Input { btf, resampler, held: Vec::new(), order: Vec::new(), smaller: Vec::new() };
                 encode(&mut self.books, &small, &texels, &nearest, Growth::Nothing, &mut found);
                 links.push(found);
             }
@@ -260,8 +263,9 @@ impl Grown {
         let used: Vec<usize> = (0..members.len()).filter(|&item| !members[item].is_empty()).collect();
         for batch in used.chunks(BATCH) {
             let revise = |&item: &usize| {
-                let of = |&[material, t]: &[usize; 2]| inputs[material].resampler.texels(inputs[material].btf, &[t]);
-                let texels: Vec<Texel> = members[item].iter().flat_map(of).collect();
+                let of_material =
+                    |run: &[[usize; 2]]| inputs[run[0][0]].texels(&run.iter().map(|&[_, t]| t).collect::<Vec<_>>());
+                let texels: Vec<Texel> = members[item].chunk_by(|a, b| a[0] == b[0]).flat_map(of_material).collect();
                 let scales: Vec<f32> = members[item].iter().map(|&[m, t]| self.links[m][0][t].scale).collect();
                 self.books.revise(item, &texels, &scales, accept)
             };
@@ -311,61 +315,19 @@ fn encode(
 ) {
     let grid = books.grid;
     for batch in texels.chunks(BATCH) {
-        let prepared = batch.par_chunks(BLOCK).flat_map_iter(|block| input.resampler.texels(input.btf, block));
-        let mut queries: Vec<Query> = prepared.map(|texel| Query::new(texel, grid)).collect();
+        let mut queries: Vec<Query> =
+            input.texels(batch).into_par_iter().map(|texel| Query::new(texel, grid)).collect();
         if growth == Growth::Nothing {
             let found: Vec<Link> =
                 queries.par_iter_mut().map(|q| books.assign(q, accept).unwrap_or_default()).collect();
             batch.iter().zip(found).for_each(|(&texel, link)| links[texel] = link);
             continue;
         }
-        queries.par_iter_mut().for_each(|query| query.refresh(books));
+        queries.par_chunks_mut(BLOCK).for_each(|queries| Query::refresh_all(queries, books));
         for (&texel, query) in batch.iter().zip(&mut queries) {
             links[texel] = books.encode(query, accept, growth);
         }
     }
-}
-
-/// The threshold under which a size falls into a range: by the slope sizes usually have until it is enclosed, then by
-/// that between both sides, on logarithms. What comes nearest, with a note, where none does.
-fn search_threshold(
-    [low, high]: [f64; 2],
-    first: f64,
-    size: impl Fn(&Grown) -> f64,
-    grow: impl Fn(f64) -> Grown,
-    report: &mut FitReport,
-) -> Grown {
-    // Too small is allowed, too large only where nothing is small enough.
-    let distance =
-        |found: f64| if found > high { OVER_BUDGET + (found / high).ln() } else { (low / found).ln().max(0.0) };
-    let wanted = 0.5 * (low.ln() + high.ln());
-    let first = first.clamp(THRESHOLDS[0], THRESHOLDS[1]);
-    let mut best = grow(first);
-    let mut nearest = size(&best);
-    report.objective.push(nearest);
-    let (mut at, mut found) = (first.ln(), nearest);
-    let rounds = report.objective.len() + ROUNDS;
-    // Logarithms of thresholds, and of sizes beyond what is wanted.
-    let mut enclosed = THRESHOLDS.map(|t| (t.ln(), None));
-    while report.objective.len() < rounds && distance(nearest) > 0.0 && enclosed[1].0 - enclosed[0].0 > 1e-3 {
-        let excess = found.ln() - wanted;
-        enclosed[usize::from(excess < 0.0)] = (at, Some(excess));
-        let (from, width) = (enclosed[0].0, enclosed[1].0 - enclosed[0].0);
-        at = match [enclosed[0].1, enclosed[1].1] {
-            [Some(above), Some(below)] => from + width * (above / (above - below)).clamp(0.1, 0.9),
-            _ => (at + excess / USUAL_SLOPE).clamp(from + 0.01 * width, from + 0.99 * width),
-        };
-        let grown = grow(at.exp());
-        found = size(&grown);
-        report.objective.push(found);
-        if distance(found) < distance(nearest) {
-            (best, nearest) = (grown, found);
-        }
-    }
-    if distance(nearest) > 0.0 {
-        report.notes.push(format!("{nearest:.0} came nearest to {low:.0}..{high:.0}"));
-    }
-    best
 }
 
 /// Bytes of the file.

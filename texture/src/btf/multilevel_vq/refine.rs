@@ -81,7 +81,7 @@ impl Growing {
             let product = super::grow::dot(&sums.luma[entry * cells..][..cells], self.unit(luma));
             self.views[entry].scale = product / sums.energies[entry] / self.lengths[luma as usize];
         }
-        self.view_energies = self.views.chunks_exact(self.grid.theta).map(|item| self.view_energy(item)).collect();
+        self.renew_views();
     }
 
     /// The item of M nearest to the means of each entry of P3, and its gain; none where nothing is lit.
