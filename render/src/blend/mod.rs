@@ -52,6 +52,17 @@ pub struct Atlas<'a> {
     bytes: u64,
 }
 
+/// A coefficient that is what somebody says, whatever the eye asks for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pin {
+    /// The facet; `None` for all of them.
+    pub facet: Option<usize>,
+    /// The layer; facets of a lower rank have none to hold.
+    pub layer: usize,
+    /// Its weight.
+    pub weight: f32,
+}
+
 /// Where colours come from.
 #[derive(Debug)]
 enum Source<'a> {
@@ -65,6 +76,7 @@ struct LayerSource<'a> {
     /// Shared by objects of one model.
     packed: Arc<Packed>,
     facets: Vec<FacetState>,
+    pins: Vec<Pin>,
     level: Level,
 }
 
@@ -118,7 +130,8 @@ impl<'a> Atlas<'a> {
         Self::empty(source, [width, height])
     }
 
-    /// Another texture of the same model, as for an object that stands elsewhere; what was laid out is shared.
+    /// Another texture of the same model, as for an object that stands elsewhere; what was laid out is shared, no weight
+    /// pinned.
     pub fn another(&self) -> Self {
         let source = match &self.source {
             Source::Layers(LayerSource { layers, packed, level, .. }) => {
@@ -152,6 +165,13 @@ impl<'a> Atlas<'a> {
         match self.source {
             Source::Layers(_) => Wanted::up_to(BLOCK_LEVEL - 1, self.size()),
             Source::Rays(_) => Wanted::none(self.size()),
+        }
+    }
+
+    /// Holds these weights fast from now on, and no others; of two for one layer the last. Rays have none.
+    pub fn pin(&mut self, pins: &[Pin]) {
+        if let Source::Layers(source) = &mut self.source {
+            source.pins = pins.to_vec();
         }
     }
 
@@ -247,7 +267,7 @@ impl Source<'_> {
 
 impl<'a> LayerSource<'a> {
     fn new(layers: &'a Layers, packed: Arc<Packed>, level: Level) -> Self {
-        Self { layers, packed, facets: vec![FacetState::default(); layers.facets.len()], level }
+        Self { layers, packed, facets: vec![FacetState::default(); layers.facets.len()], pins: Vec::new(), level }
     }
 }
 
@@ -261,14 +281,22 @@ impl LayerSource<'_> {
             chunks.iter().for_each(|chunk| self.facets[chunk.facet as usize].is_wanted = true);
         }
         let layers = &self.layers.layers;
-        let facets = self.facets.par_iter_mut().zip(&self.layers.facets).with_min_len(8);
-        facets.filter(|(state, _)| state.is_wanted).for_each_init(Weights::default, |weights, (state, facet)| {
-            weights.round(&facet.at(eye), layers);
-            if *weights != state.weights {
-                std::mem::swap(weights, &mut state.weights);
-                state.changed = frame;
-            }
-        });
+        let pins = &self.pins;
+        let facets = self.facets.par_iter_mut().zip(&self.layers.facets).enumerate().with_min_len(8);
+        facets.filter(|(_, (state, _))| state.is_wanted).for_each_init(
+            Weights::default,
+            |weights, (i, (state, facet))| {
+                let mut asked = facet.at(eye);
+                for pin in pins.iter().filter(|pin| pin.facet.is_none_or(|facet| facet == i)) {
+                    asked.get_mut(pin.layer).into_iter().for_each(|weight| *weight = pin.weight);
+                }
+                weights.round(&asked, layers);
+                if *weights != state.weights {
+                    std::mem::swap(weights, &mut state.weights);
+                    state.changed = frame;
+                }
+            },
+        );
     }
 
     /// The level where a block is one texel.
