@@ -39,7 +39,7 @@ enum Source<'a> {
     /// [`Actor::set_atlas`]; or a model without texels, which is black.
     Given,
     Blended(Box<blend::Atlas<'a>>),
-    Layers(LayerBlend<'a>),
+    Layers(Box<LayerBlend<'a>>),
     Rays(Box<RayBlend>),
 }
 
@@ -208,7 +208,7 @@ impl<'a> Source<'a> {
     fn new(device: &Device, model: &'a Model, blend: Blend, surface: &Surface) -> Result<Self, GpuError> {
         Ok(match (blend, &model.appearance) {
             (Blend::Cpu, _) => Self::Blended(Box::new(blend::Atlas::new(model))),
-            (Blend::Adapter, Appearance::Layers(layers)) => Self::Layers(LayerBlend::new(device, layers)?),
+            (Blend::Adapter, Appearance::Layers(layers)) => Self::Layers(Box::new(LayerBlend::new(device, layers)?)),
             (Blend::Adapter, Appearance::Lumigraph(rays, texels)) => {
                 Self::Rays(Box::new(RayBlend::new(device, rays, texels, surface.middle())?))
             }
@@ -220,7 +220,7 @@ impl<'a> Source<'a> {
         Ok(match self {
             Self::Given => Self::Given,
             Self::Blended(atlas) => Self::Blended(Box::new(atlas.another())),
-            Self::Layers(layers) => Self::Layers(layers.another(device)?),
+            Self::Layers(layers) => Self::Layers(Box::new(layers.another(device)?)),
             Self::Rays(rays) => Self::Rays(Box::new(rays.another(device)?)),
         })
     }
