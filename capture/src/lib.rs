@@ -48,6 +48,7 @@ pub use contour::{BinaryMatte, ContourOptions, Contours, Surround};
 pub use error::CaptureError;
 pub use formats::{CaptureFormat, detect_format};
 pub use image::Image;
+pub use load::reduced;
 pub use masks::MaskSource;
 pub use matte::{erode, grow, is_binary, signed_distance, smooth};
 pub use pixels::{read_matte, read_rgb, write_matte, write_rgb};

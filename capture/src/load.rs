@@ -147,8 +147,8 @@ pub(crate) fn touches_border(matte: &Image<u8>) -> bool {
 
 /// Area average over whole blocks, in encoded values, of each channel; a rest at the right and bottom
 /// is dropped, as `Camera::downscaled` assumes.
-pub(crate) fn reduced(image: &Image<[u8; 3]>, factor: usize) -> Image<[u8; 3]> {
-    if factor == 1 {
+pub fn reduced(image: &Image<[u8; 3]>, factor: usize) -> Image<[u8; 3]> {
+    if factor <= 1 {
         return image.clone();
     }
     blocks(image, factor, |sum, p| (0..3).for_each(|c| sum[c] += u32::from(p[c])), |mean| mean)

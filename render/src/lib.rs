@@ -30,12 +30,15 @@ pub mod filter;
 #[cfg(feature = "gpu")]
 pub mod gpu;
 pub mod material;
+pub mod orbit;
 pub mod path;
 mod pose;
 pub mod reference;
 mod resolve;
 mod simd;
 pub mod web;
+#[cfg(feature = "window")]
+pub mod window;
 
 pub use error::RenderError;
 pub use pose::Pose;

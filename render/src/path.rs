@@ -4,6 +4,9 @@ use capture::{Aabb, Camera, Distortion, Intrinsics};
 use nalgebra::{Matrix3, Point3, Quaternion, Rotation3, Unit, UnitQuaternion, Vector3};
 use std::f64::consts::TAU;
 
+/// Frames of a turn for which no number is given.
+pub const TURN_FRAMES: usize = 72;
+
 /// How much of the frame the corners of the object's box span at most, in width and in height. A round
 /// object then fills two thirds of it and a box-shaped one nearly all: 80 % or so for what lies between,
 /// and nothing is ever cut off.
@@ -30,7 +33,7 @@ pub fn turntable_cameras(
     height: usize,
     up: Vector3<f64>,
 ) -> Vec<Camera> {
-    let up = up.try_normalize(0.0).filter(|u| u.iter().all(|x| x.is_finite())).unwrap_or_else(Vector3::z);
+    let up = usable_axis(up);
     let aabb = usable_box(aabb);
     let like = like.filter(|camera| crate::is_usable(camera));
     let outward = like
@@ -142,7 +145,12 @@ fn plane_normal(scatter: &Matrix3<f64>) -> Option<Vector3<f64>> {
     (!in_line && !in_space).then(|| eigen.eigenvectors.column(order[0]).into_owned())
 }
 
-fn usable_box(aabb: &Aabb) -> Aabb {
+/// Unit; z where it says nothing.
+pub(crate) fn usable_axis(axis: Vector3<f64>) -> Vector3<f64> {
+    axis.try_normalize(0.0).filter(|u| u.iter().all(|x| x.is_finite())).unwrap_or_else(Vector3::z)
+}
+
+pub(crate) fn usable_box(aabb: &Aabb) -> Aabb {
     let size = aabb.size();
     if size.iter().all(|x| x.is_finite() && *x >= 0.0) && aabb.diagonal() > 0.0 && aabb.diagonal().is_finite() {
         return *aabb;
@@ -177,7 +185,7 @@ fn intrinsics(like: Option<&Camera>, width: usize, height: usize) -> Intrinsics 
 }
 
 /// World to camera, from a place in direction `outward` towards the centre, `up` upwards.
-fn looking_inward(outward: &Vector3<f64>, up: &Vector3<f64>) -> Matrix3<f64> {
+pub(crate) fn looking_inward(outward: &Vector3<f64>, up: &Vector3<f64>) -> Matrix3<f64> {
     let forward = -outward;
     // Straight above or below, any direction will do as right.
     let right = forward

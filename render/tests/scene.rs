@@ -7,11 +7,12 @@ mod support;
 use capture::{Camera, Image};
 use models::{bumpy_ball, dyntex, lumigraph, still, vdtm};
 use nalgebra::{Point3, Rotation3, Vector3};
+use render::blend::Pin;
 use render::cpu::{Object, ScenePlayer};
 use render::material::Lighting;
 use render::{Pose, RenderOptions, reference};
 use support::look_at;
-use texture::Model;
+use texture::{Appearance, Model};
 
 const SIZE: [usize; 2] = [200, 180];
 
@@ -147,4 +148,35 @@ fn a_scene_without_anything_is_empty() {
     let object = Object { pose: nowhere, ..Object::new(&model) };
     let frame = ScenePlayer::new(&[object], options(1)).render(&camera(0.0, 3.0), &Lighting::default());
     assert!(frame.pixels().iter().all(|p| *p == [0; 4]));
+}
+
+#[test]
+fn held_weights_play_as_a_model_whose_tables_hold_them() {
+    let model = dyntex(bumpy_ball(9, SIZE), 7, 12, |facet| 2 + facet % 6);
+    let pins = [
+        Pin { facet: None, layer: 3, weight: -1.5 },
+        Pin { facet: Some(4), layer: 1, weight: 2.0 },
+        // Of no facet, and of no layer: nothing to hold.
+        Pin { facet: Some(9999), layer: 0, weight: 9.0 },
+        Pin { facet: None, layer: 99, weight: 9.0 },
+    ];
+    let mut held = model.clone();
+    let Appearance::Layers(layers) = &mut held.appearance else { panic!("layers") };
+    for (f, facet) in layers.facets.iter_mut().enumerate() {
+        let mine = pins.iter().filter(|pin| pin.layer < facet.rank && pin.facet.is_none_or(|of| of == f));
+        for pin in mine {
+            facet.table.iter_mut().skip(pin.layer).step_by(facet.rank).for_each(|weight| *weight = pin.weight);
+        }
+    }
+    let mut player = ScenePlayer::new(&[Object::new(&model)], options(1));
+    let mut other = ScenePlayer::new(&[Object::new(&held)], options(1));
+    let camera = camera(0.4, 2.5);
+    let free = player.render(&camera, &Lighting::default());
+    player.pin(0, &pins);
+    player.pin(7, &pins);
+    let pinned = player.render(&camera, &Lighting::default());
+    assert!(apart(&free, &pinned)[1] > 500, "nothing was held");
+    assert_alike("held", &other.render(&camera, &Lighting::default()), &pinned);
+    player.pin(0, &[]);
+    assert_eq!(player.render(&camera, &Lighting::default()), free);
 }

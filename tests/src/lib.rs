@@ -49,7 +49,9 @@ fn build() -> PathBuf {
     let profile = here.ancestors().nth(2).unwrap_or_else(|| panic!("{} is in no target folder", here.display()));
     let mut cargo = Command::new(env!("CARGO"));
     cargo.args(["build", "--quiet", "--package", "turnlight", "--bin", "turnlight"]);
-    for (feature, is_on) in [("gpu", cfg!(feature = "gpu")), ("video", cfg!(feature = "video"))] {
+    let features =
+        [("gpu", cfg!(feature = "gpu")), ("video", cfg!(feature = "video")), ("window", cfg!(feature = "window"))];
+    for (feature, is_on) in features {
         if is_on {
             cargo.args(["--features", feature]);
         }

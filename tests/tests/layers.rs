@@ -15,8 +15,16 @@ const ALLOWED: [(&str, &[&str]); 8] = [
 ];
 
 /// Crates from outside that only one of ours may name: `(theirs, ours)`.
-const HELD: [(&str, &str); 4] =
-    [("clap", "turnlight"), ("indicatif", "turnlight"), ("opencv", "capture"), ("wgpu", "render")];
+const HELD: [(&str, &str); 8] = [
+    ("clap", "turnlight"),
+    ("egui", "render"),
+    ("egui-wgpu", "render"),
+    ("egui-winit", "render"),
+    ("indicatif", "turnlight"),
+    ("opencv", "capture"),
+    ("wgpu", "render"),
+    ("winit", "render"),
+];
 
 /// Names of the dependencies in a manifest, in every table whose name ends in `dependencies`.
 fn dependencies(manifest: &str) -> Vec<String> {

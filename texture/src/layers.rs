@@ -121,7 +121,7 @@ impl Layers {
 
 /// Spreads labels from the texels that have one to the whole atlas, nearest (in steps) first.
 /// `index` are positions `y · width + x`; deterministic.
-pub(crate) fn spread_labels([width, height]: [usize; 2], index: &[u32], labels: &[u16]) -> Image<u16> {
+pub fn spread_labels([width, height]: [usize; 2], index: &[u32], labels: &[u16]) -> Image<u16> {
     let mut known = vec![false; width * height];
     let mut out = Image::filled(width, height, 0u16);
     let mut front: Vec<u32> = index.to_vec();

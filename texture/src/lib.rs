@@ -26,7 +26,7 @@ pub use bake::Bake;
 pub use error::TextureError;
 pub use facets::Facets;
 pub use glb::EXTENSION;
-pub use layers::{FacetWeights, Layer, Layers};
+pub use layers::{FacetWeights, Layer, Layers, spread_labels};
 pub use material_layer::{MaterialLayer, charts_of_file};
 pub use model::{Appearance, FitOptions, FitReport, Method, Model, ModelBytes, fit};
 pub use surface::SurfaceTexels;

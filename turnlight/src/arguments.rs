@@ -10,6 +10,7 @@ use turnlight::render;
 use turnlight::scene::MOST_OBJECTS;
 use turnlight::swatch::Shape;
 use turnlight::texture::btf::{Budget, CodecKind, Precision};
+use turnlight::viewer::Panel;
 
 /// What this build can and cannot do.
 const FILMS: &str = if cfg!(feature = "video") {
@@ -129,6 +130,14 @@ pub(crate) struct PageArgs {
     pub(crate) up: Option<String>,
 }
 
+impl PageArgs {
+    /// The axis, if one is given.
+    #[cfg(feature = "window")]
+    pub(crate) fn axis(&self) -> Option<[f64; 3]> {
+        self.up.as_deref().and_then(|name| axis(name).ok())
+    }
+}
+
 #[derive(Debug, Args)]
 pub(crate) struct ExportArgs {
     /// The model to export
@@ -145,17 +154,52 @@ pub(crate) struct ExportArgs {
 
 #[derive(Debug, Args)]
 pub(crate) struct ViewArgs {
-    /// The model to show
-    pub(crate) model: PathBuf,
-    /// Show it in a browser: serve it to this machine alone, and print the address
-    #[arg(long, required = true)]
-    pub(crate) web: bool,
+    /// The model to show, or a scene of several (.json); more than one are ways to see the same object
+    #[arg(required = true, value_name = "MODEL")]
+    pub(crate) models: Vec<PathBuf>,
     #[command(flatten)]
     pub(crate) page: PageArgs,
+    #[command(flatten)]
+    pub(crate) window: ViewWindowArgs,
+    #[command(flatten)]
+    pub(crate) web: ViewWebArgs,
+}
+
+/// How a window shows models.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "In a window")]
+pub(crate) struct ViewWindowArgs {
+    /// Photographs to hold the model against
+    #[arg(long, value_name = "CAPTURE", conflicts_with = "web")]
+    pub(crate) capture: Option<PathBuf>,
+    /// Size of the window
+    #[arg(long, value_name = "WxH", default_value = "1200x800", value_parser = size)]
+    pub(crate) size: [usize; 2],
+    /// Panels to unfold: facets, directions, basis, light, capture, times, keys; none: the picture alone
+    #[arg(long, value_name = "LIST", default_value = "times,keys", value_parser = panels)]
+    pub(crate) panels: Panels,
+    /// Who draws; pictures differ by a level at most, nearly everywhere
+    #[arg(long, value_enum, default_value = "auto")]
+    pub(crate) renderer: RendererArg,
+    /// Write the first picture to this file and close
+    #[arg(long, value_name = "FILE.png", conflicts_with = "web")]
+    pub(crate) screenshot: Option<PathBuf>,
+}
+
+/// How a browser shows a model.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "In a browser")]
+pub(crate) struct ViewWebArgs {
+    /// Show it in a browser: serve it to this machine alone, and print the address
+    #[arg(long)]
+    pub(crate) web: bool,
     /// Port to serve on; 0 takes any free one
-    #[arg(long, value_name = "N", default_value = "0")]
+    #[arg(long, value_name = "N", default_value = "0", requires = "web")]
     pub(crate) port: u16,
 }
+
+/// Panels to unfold; `None`: not even folded ones.
+pub(crate) type Panels = Option<Vec<Panel>>;
 
 /// What is done with bidirectional texture functions.
 #[derive(Debug, Subcommand)]
@@ -1007,6 +1051,10 @@ fn direction(text: &str) -> Result<[f64; 3], String> {
         .ok()
         .filter(|v| v.iter().any(|c| *c != 0.0))
         .ok_or_else(|| "needs x, y, z, -x, -y, -z, or three numbers that are not all zero, as in 0,0.1,1".to_owned())
+}
+
+fn panels(text: &str) -> Result<Panels, String> {
+    if text == "none" { Ok(None) } else { text.split(',').map(str::parse).collect::<Result<_, _>>().map(Some) }
 }
 
 fn step(text: &str) -> Result<f64, String> {

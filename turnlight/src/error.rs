@@ -24,6 +24,10 @@ pub enum Error {
     /// A model cannot be drawn.
     #[error(transparent)]
     Render(#[from] render::RenderError),
+    /// No window can be opened.
+    #[cfg(feature = "window")]
+    #[error(transparent)]
+    Window(#[from] render::window::WindowError),
     /// A synthetic capture cannot be made.
     #[error(transparent)]
     Synth(#[from] data_synth::SynthError),

@@ -19,7 +19,8 @@
 //! - [`shading`]: how the object is lit over a turn;
 //! - [`stages`]: what each stage costs;
 //! - [`swatch`]: a material on show;
-//! - [`truth`]: a mesh held against the true one.
+//! - [`truth`]: a mesh held against the true one;
+//! - [`viewer`]: what a window shows, without the window; `window`: the window (feature `window`).
 
 pub mod bench;
 pub mod btf;
@@ -43,6 +44,9 @@ pub mod shading;
 pub mod stages;
 pub mod swatch;
 pub mod truth;
+pub mod viewer;
+#[cfg(feature = "window")]
+pub mod window;
 
 pub use error::Error;
 pub use selection::Selection;

@@ -6,6 +6,8 @@ use capture::{Camera, Image};
 #[cfg(feature = "gpu")]
 use render::Pose;
 use render::RenderOptions;
+use render::backdrop::put_behind;
+use render::blend::Pin;
 use render::cpu::ScenePlayer;
 #[cfg(feature = "gpu")]
 use render::gpu;
@@ -27,6 +29,9 @@ pub enum Choice {
 #[derive(Debug)]
 pub struct Projector<'a> {
     player: ScenePlayer<'a>,
+    backdrop: Option<&'a Image<[f32; 3]>>,
+    /// Objects some of whose weights are held fast, which the CPU alone can do.
+    pinned: Vec<usize>,
     #[cfg(feature = "gpu")]
     hardware: Option<Hardware<'a>>,
     device: String,
@@ -62,6 +67,8 @@ impl<'a> Projector<'a> {
         }
         let projector = Self {
             player: ScenePlayer::new(&playback::objects(scene, coats), options),
+            backdrop: scene.backdrop.as_ref(),
+            pinned: Vec::new(),
             #[cfg(feature = "gpu")]
             hardware: None,
             device: of_cpu(),
@@ -85,8 +92,25 @@ impl<'a> Projector<'a> {
         self.note.take()
     }
 
-    /// Draws one frame: RGBA, 8 bit encoded, not premultiplied, alpha the coverage of the pixel.
+    /// Holds weights of the layers of one object of the scene fast, until other `pins` take their place.
+    pub fn pin(&mut self, object: usize, pins: &[Pin]) {
+        self.pinned.retain(|&other| other != object);
+        if !pins.is_empty() {
+            self.pinned.push(object);
+        }
+        self.player.pin(object, pins);
+    }
+
+    /// Draws one frame, with the scene's backdrop: RGBA, 8 bit encoded, not premultiplied, alpha the coverage of the pixel.
     pub fn frame(&mut self, camera: &Camera, lighting: &Lighting) -> Image<[u8; 4]> {
+        let mut frame = self.objects(camera, lighting);
+        if let Some(backdrop) = self.backdrop {
+            put_behind(&mut frame, backdrop, camera);
+        }
+        frame
+    }
+
+    fn objects(&mut self, camera: &Camera, lighting: &Lighting) -> Image<[u8; 4]> {
         #[cfg(feature = "gpu")]
         if let Some(frame) = self.frame_of_hardware(camera, lighting) {
             return frame;
@@ -106,7 +130,8 @@ impl<'a> Projector<'a> {
 
     /// `None` where the CPU is to draw; after a fault it draws the rest, too.
     fn frame_of_hardware(&mut self, camera: &Camera, lighting: &Lighting) -> Option<Image<[u8; 4]>> {
-        match self.hardware.as_mut()?.frame(camera, lighting) {
+        let hardware = self.hardware.as_mut().filter(|_| self.pinned.is_empty());
+        match hardware?.frame(camera, lighting) {
             Ok(frame) => Some(frame),
             Err(fault) => {
                 self.hardware = None;

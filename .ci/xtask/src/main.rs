@@ -53,6 +53,9 @@ fn test(args: &[String]) -> Result<()> {
     if let Err(fault) = packages::ensure(&[packages::VULKAN]) {
         eprintln!("xtask: a Vulkan driver is not to be had ({fault:#}); where there is no other, its tests skip");
     }
+    if let Err(fault) = packages::ensure(&[packages::XVFB]) {
+        eprintln!("xtask: Xvfb is not to be had ({fault:#}); the test of what is on the screen skips");
+    }
     let (with_blender, args) = match args.split_first() {
         Some((first, rest)) if first == BLENDER => (true, rest),
         _ => (false, args),
@@ -72,10 +75,10 @@ fn lint(args: &[String]) -> Result<()> {
 /// What to build besides the default.
 fn features() -> &'static [&'static str] {
     match packages::ensure(&[packages::OPENCV, packages::CLANG]) {
-        Ok(()) => &["--features", "tests/gpu,tests/video"],
+        Ok(()) => &["--features", "tests/window,tests/video"],
         Err(fault) => {
             eprintln!("xtask: OpenCV is not to be had ({fault:#}); films are neither built nor tested");
-            &["--features", "tests/gpu"]
+            &["--features", "tests/window"]
         }
     }
 }

@@ -26,6 +26,11 @@ pub(crate) const CHROMIUM: Package = Package { probe: &["chromium", "--version"]
 /// Stands in for graphics hardware.
 pub(crate) const VULKAN: Package =
     Package { probe: &["sh", "-c", "ls /usr/share/vulkan/icd.d/lvp_icd*"], names: &["mesa-vulkan-drivers"] };
+/// A screen in memory, and what a window asks of its keyboard.
+pub(crate) const XVFB: Package = Package {
+    probe: &["sh", "-c", "command -v Xvfb && ls /usr/lib/*/libxkbcommon-x11.so.0 /usr/lib/*/libXcursor.so.1"],
+    names: &["xvfb", "libxkbcommon-x11-0", "libxcursor1", "libxi6", "libxrandr2"],
+};
 /// Runs the referee, and what we hand to Blender.
 pub(crate) const PYTHON: Package =
     Package { probe: &["python3", "-c", "import ensurepip, venv"], names: &["python3", "python3-venv"] };

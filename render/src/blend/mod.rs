@@ -51,6 +51,17 @@ pub struct Atlas<'a> {
     bytes: u64,
 }
 
+/// A coefficient that is what somebody says, whatever the eye asks for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pin {
+    /// The facet; `None` for all of them.
+    pub facet: Option<usize>,
+    /// The layer; facets of a lower rank have none to hold.
+    pub layer: usize,
+    /// Its weight.
+    pub weight: f32,
+}
+
 /// Where colours come from.
 #[derive(Debug)]
 enum Source<'a> {
@@ -63,6 +74,7 @@ struct LayerSource<'a> {
     layers: &'a Layers,
     packed: Packed,
     facets: Vec<FacetState>,
+    pins: Vec<Pin>,
     level: Level,
 }
 
@@ -108,7 +120,16 @@ impl<'a> Atlas<'a> {
             Appearance::Layers(layers) => {
                 let facets = vec![FacetState::default(); layers.facets.len()];
                 let size = [layers.facet_of_texel.width(), layers.facet_of_texel.height()];
-                (Source::Layers(LayerSource { layers, packed: Packed::new(layers), facets, level }), size)
+                (
+                    Source::Layers(LayerSource {
+                        layers,
+                        packed: Packed::new(layers),
+                        facets,
+                        pins: Vec::new(),
+                        level,
+                    }),
+                    size,
+                )
             }
             Appearance::Lumigraph(rays, surface) => {
                 (Source::Rays(Box::new(Rays::new(rays, surface, level))), surface.size)
@@ -136,6 +157,13 @@ impl<'a> Atlas<'a> {
         match self.source {
             Source::Layers(_) => Wanted::up_to(BLOCK_LEVEL - 1, self.size()),
             Source::Rays(_) => Wanted::none(self.size()),
+        }
+    }
+
+    /// Holds these weights fast from now on, and no others; of two for one layer the last. Rays have none.
+    pub fn pin(&mut self, pins: &[Pin]) {
+        if let Source::Layers(source) = &mut self.source {
+            source.pins = pins.to_vec();
         }
     }
 
@@ -239,14 +267,22 @@ impl LayerSource<'_> {
             chunks.iter().for_each(|chunk| self.facets[chunk.facet as usize].is_wanted = true);
         }
         let layers = &self.layers.layers;
-        let facets = self.facets.par_iter_mut().zip(&self.layers.facets).with_min_len(8);
-        facets.filter(|(state, _)| state.is_wanted).for_each_init(Weights::default, |weights, (state, facet)| {
-            weights.round(&facet.at(eye), layers);
-            if *weights != state.weights {
-                std::mem::swap(weights, &mut state.weights);
-                state.changed = frame;
-            }
-        });
+        let pins = &self.pins;
+        let facets = self.facets.par_iter_mut().zip(&self.layers.facets).enumerate().with_min_len(8);
+        facets.filter(|(_, (state, _))| state.is_wanted).for_each_init(
+            Weights::default,
+            |weights, (i, (state, facet))| {
+                let mut asked = facet.at(eye);
+                for pin in pins.iter().filter(|pin| pin.facet.is_none_or(|facet| facet == i)) {
+                    asked.get_mut(pin.layer).into_iter().for_each(|weight| *weight = pin.weight);
+                }
+                weights.round(&asked, layers);
+                if *weights != state.weights {
+                    std::mem::swap(weights, &mut state.weights);
+                    state.changed = frame;
+                }
+            },
+        );
     }
 
     /// The level where a block is one texel.

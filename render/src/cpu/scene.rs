@@ -2,7 +2,7 @@
 
 use super::shade::Look;
 use super::{Canvas, Part, StageTimes};
-use crate::blend::{Atlas, Wanted};
+use crate::blend::{Atlas, Pin, Wanted};
 use crate::material::{Coats, Lighting, Lit};
 use crate::{Pose, RenderOptions};
 use capture::{Camera, Image};
@@ -57,6 +57,13 @@ impl<'a> ScenePlayer<'a> {
             Actor { mesh: &model.mesh, pose, coats, atlas, wanted, lighting: Lighting::default() }
         };
         Self { actors: objects.par_iter().map(actor).collect(), canvas: Canvas::new(options) }
+    }
+
+    /// Holds weights of the layers of the object at this position fast; see [`Atlas::pin`].
+    pub fn pin(&mut self, object: usize, pins: &[Pin]) {
+        if let Some(actor) = self.actors.get_mut(object) {
+            actor.atlas.pin(pins);
+        }
     }
 
     /// How long the stages of the last frame took.

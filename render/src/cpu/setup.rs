@@ -145,18 +145,75 @@ fn over_pixels(n: Vector3<f64>, i: &Intrinsics) -> Linear {
     [x, y, n.z - x * i.cx - y * i.cy]
 }
 
-/// The box of the projected corners; the whole plane where the face reaches behind the camera.
+/// The box of what is in front of the camera, projected. Where a face crosses the camera's plane its picture runs to
+/// infinity, on that side alone: `u / z` takes its extremes over a convex part in front at the corners of that part.
 fn bounds(corners: &[Vector3<f64>; 3], intrinsics: &Intrinsics) -> ([f64; 2], [f64; 2]) {
     let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
-    for c in corners {
-        if c.z <= 0.0 {
-            return ([f64::NEG_INFINITY; 2], [f64::INFINITY; 2]);
-        }
+    for c in corners.iter().filter(|c| c.z > 0.0) {
         let pixel = intrinsics.pixel_from_plane(nalgebra::Vector2::new(c.x / c.z, c.y / c.z));
         for k in 0..2 {
             low[k] = low[k].min(pixel[k] - BOUNDS_MARGIN);
             high[k] = high[k].max(pixel[k] + BOUNDS_MARGIN);
         }
+        for behind in corners.iter().filter(|behind| behind.z <= 0.0) {
+            let crossing = c.lerp(behind, c.z / (c.z - behind.z));
+            let toward = [intrinsics.fx * crossing.x + intrinsics.skew * crossing.y, intrinsics.fy * crossing.y];
+            // So near to the eye itself rounding decides the side: both, then.
+            let doubt =
+                1e-9 * (c.amax() + behind.amax()) * (intrinsics.fx.abs() + intrinsics.skew.abs() + intrinsics.fy.abs());
+            for k in 0..2 {
+                low[k] = if toward[k] > doubt { low[k] } else { f64::NEG_INFINITY };
+                high[k] = if toward[k] < -doubt { high[k] } else { f64::INFINITY };
+            }
+        }
     }
     (low, high)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use capture::Distortion;
+    use nalgebra::Vector2;
+
+    fn intrinsics() -> Intrinsics {
+        let distortion = Distortion::default();
+        Intrinsics { fx: 300.0, fy: -280.0, skew: 20.0, cx: 160.0, cy: 120.0, distortion, width: 320, height: 240 }
+    }
+
+    #[test]
+    fn bounds_hold_all_that_is_in_front_and_end_where_a_face_cannot_be() {
+        let mut crossings = 0;
+        for k in 0..400 {
+            let wave = |i: usize| ((k * 9 + i) as f64 * 12.9898).sin() * 2.0;
+            let corners = [0, 3, 6].map(|i| Vector3::new(wave(i), wave(i + 1), wave(i + 2) + 0.5));
+            if corners.iter().all(|c| c.z <= 0.0) {
+                continue;
+            }
+            let (low, high) = bounds(&corners, &intrinsics());
+            crossings +=
+                usize::from(corners.iter().any(|c| c.z <= 0.0) && (0..2).any(|i| low[i].max(-high[i]).is_finite()));
+            for (s, t) in (0..=40).flat_map(|i| (0..=40 - i).map(move |j| (i as f64 / 40.0, j as f64 / 40.0))) {
+                let p = corners[0] * (1.0 - s - t) + corners[1] * s + corners[2] * t;
+                if p.z <= 0.0 {
+                    continue;
+                }
+                let pixel = intrinsics().pixel_from_plane(Vector2::new(p.x / p.z, p.y / p.z));
+                let slack = 1e-9 * pixel.coords.amax();
+                let is_held = (0..2).all(|i| low[i] <= pixel[i] + slack && pixel[i] <= high[i] + slack);
+                assert!(is_held, "{pixel} of {corners:?} is outside {low:?} to {high:?}");
+            }
+        }
+        assert!(crossings > 100, "{crossings} faces through the camera's plane are bounded");
+    }
+
+    #[test]
+    fn a_face_beside_the_eye_is_beside_the_frame() {
+        let corners = [[2.0, 0.0, 1.0], [2.0, 0.3, -1.0], [2.5, -0.3, -1.0]].map(Vector3::from);
+        let (low, _) = bounds(&corners, &intrinsics());
+        assert!(low[0] > 320.0, "{low:?}");
+        // One around the eye may be anywhere.
+        let around = [[2.0, 0.0, 1.0], [-2.0, 1.0, -0.1], [-2.0, -1.0, -0.1]].map(Vector3::from);
+        assert_eq!(bounds(&around, &intrinsics()).0[0], f64::NEG_INFINITY);
+    }
 }

@@ -20,11 +20,12 @@ mod synth_film;
 pub(crate) mod turntable;
 pub(crate) mod view;
 
-use crate::arguments::{CaptureArgs, FitArgs, MeshArgs, MethodArg, PageArgs, ShapeArgs};
+use crate::arguments::{CaptureArgs, FitArgs, MeshArgs, MethodArg, PageArgs, RendererArg, ShapeArgs};
 use std::path::Path;
 use turnlight::capture::{Capture, LoadOptions, MaskSource, View};
 use turnlight::export::web::Site;
 use turnlight::pipeline::ShapeOptions;
+use turnlight::projector::Choice;
 use turnlight::stages::Stages;
 use turnlight::texture::{FitOptions, Method};
 use turnlight::{Error, Selection};
@@ -95,6 +96,14 @@ fn write_capture(capture: &Capture, output: &Path, stages: &mut Stages<'_>) -> R
     let views = stages.run("find silhouettes", |_| capture.load_all_views(&LoadOptions::default()))?;
     let mattes: Vec<_> = views.into_iter().map(|view| view.matte).collect();
     Ok(stages.run("write", |_| capture.write_with_mattes(&mattes, output))?)
+}
+
+fn choice(renderer: RendererArg) -> Choice {
+    match renderer {
+        RendererArg::Auto => Choice::Auto,
+        RendererArg::Cpu => Choice::Cpu,
+        RendererArg::Gpu => Choice::Gpu,
+    }
 }
 
 impl PageArgs {

@@ -1,23 +1,20 @@
 //! `turnlight render`
 
-use super::read_capture;
+use super::{choice, read_capture};
 use crate::Answer;
-use crate::arguments::{RenderArgs, RendererArg};
+use crate::arguments::RenderArgs;
 use serde_json::json;
 use std::time::Instant;
 use turnlight::capture::{Aabb, Camera, Capture, Image};
 use turnlight::output::OutputFolder;
-use turnlight::projector::{Choice, Projector};
+use turnlight::projector::Projector;
 use turnlight::render::RenderOptions;
-use turnlight::render::backdrop::put_behind;
 use turnlight::render::film::write_png;
-use turnlight::render::path::{smooth_cameras, turntable_cameras, up_axis};
+use turnlight::render::path::{TURN_FRAMES, smooth_cameras, turntable_cameras, up_axis};
 use turnlight::scene::Scene;
 use turnlight::stages::{Observer, Stages};
 use turnlight::{Error, film, playback};
 
-/// Frames of a film for which no number is given.
-const TURNTABLE_FRAMES: usize = 72;
 /// Size of the frames where nothing gives it.
 const SIZE: [usize; 2] = [640, 480];
 
@@ -83,7 +80,7 @@ fn cameras(args: &RenderArgs, scene: &Scene) -> Result<Vec<Numbered>, Error> {
             "nothing says from where to draw; give --cameras, --turntable or --path".to_owned(),
         ));
     }
-    let n = args.turntable.unwrap_or(TURNTABLE_FRAMES);
+    let n = args.turntable.unwrap_or(TURN_FRAMES);
     Ok(orbit(args, scene, capture.as_ref(), n).into_iter().enumerate().collect())
 }
 
@@ -124,14 +121,6 @@ fn orbit(args: &RenderArgs, scene: &Scene, capture: Option<&Capture>, n: usize) 
     turntable_cameras(&aabb, like, n, size[0], size[1], up)
 }
 
-fn choice(renderer: RendererArg) -> Choice {
-    match renderer {
-        RendererArg::Auto => Choice::Auto,
-        RendererArg::Cpu => Choice::Cpu,
-        RendererArg::Gpu => Choice::Gpu,
-    }
-}
-
 /// Draws every frame once, to the folder and to the film; says what drew them.
 fn draw(
     scene: &Scene,
@@ -148,10 +137,7 @@ fn draw(
     let lamps = args.light.lamps(scene.aabb().map_or([0.0; 3], |aabb| aabb.center().into()))?;
     let mut frame = |i: usize, camera: &Camera| {
         let start = Instant::now();
-        let mut frame = projector.frame(camera, &lamps.seen_by(camera));
-        if let Some(backdrop) = &scene.backdrop {
-            put_behind(&mut frame, backdrop, camera);
-        }
+        let frame = projector.frame(camera, &lamps.seen_by(camera));
         times_ms.push(start.elapsed().as_secs_f64() * 1e3);
         projector.take_note().iter().for_each(|note| observer.noted(note));
         observer.advanced(i + 1, cameras.len());

@@ -434,7 +434,7 @@ fn shadow_that_turns_with_the_target_is_known_where_little_of_it_is_seen() {
         1.0 - 0.7 * (-0.5 * squared / 400.0).exp()
     };
     let places = || (0..120).flat_map(|y| (0..120).map(move |x| (x, y)));
-    let print = |x: usize, y: usize| if (x / 12 + y / 12) % 2 == 0 { paper } else { ink };
+    let print = |x: usize, y: usize| if (x / 12 + y / 12).is_multiple_of(2) { paper } else { ink };
     let hidden = |x: usize, y: usize| (50..70).contains(&x) && (54..66).contains(&y);
     let texel = |(x, y): (usize, usize)| match hidden(x, y) {
         true => cluster::Cluster::COVERED,
