@@ -16,7 +16,7 @@
 //!   is in the samples it goes on falling: they are scaled by `l_z / z`, so that nothing breaks off where the
 //!   light sets.
 //! - `texels, w`: [`texture::tile`]; one repetition measures [`Coat::tile_size`] world units, whatever the chart's density.
-//!   Beyond three texels a footprint looks up [`averages`] over ever larger cells in their place.
+//!   Beyond three texels a footprint looks up averages over ever larger cells in their place (`averages.rs`).
 //! - Both sides of a face carry the material, its outside turned to the eye.
 //!
 //! State: surfaces neither shadow nor light each other; photographed charts stay as photographed, for their light
