@@ -19,9 +19,9 @@ const NOISE: f32 = 3.0;
 /// Of what is expected: light that is not quite as smooth as thought.
 const LIGHT_ERROR: f32 = 0.03;
 
-/// The least of what is left of the (encoded) light in shadow: where the light is not known yet, and beside what is
-/// known of it.
-const DEEPEST_SHADOW: [f32; 2] = [0.35, 0.7];
+/// The least of what is left of the (encoded) light in shadow: where no hull is known yet, and with it the light beside
+/// it.
+pub(super) const DEEPEST_SHADOW: [f32; 2] = [0.35, 0.7];
 
 /// Of the light that a shadow takes: what the object beside it throws back in its own colour.
 const SHADOW_TINT: f32 = 0.1;
@@ -45,16 +45,16 @@ pub(super) struct Odds {
 }
 
 /// Of a picture, given what room and target look like from there. Where both are
-/// unknown (support 0) the two palettes decide.
+/// unknown (support 0) the two palettes decide. `deepest` is the least that shadow leaves of the encoded light.
 pub(super) fn of(
     picture: &Toned,
     room: Option<&Image<Cluster>>,
     target: Option<(&Image<Cluster>, &Shade)>,
     palettes: &Palettes,
     nearby: Option<&Nearby>,
+    deepest: f32,
     size: (usize, usize),
 ) -> Odds {
-    let deepest = DEEPEST_SHADOW[usize::from(nearby.is_some())];
     let (width, height) = size;
     let mut log_odds = Image::filled(width, height, 0.0);
     let mut background = Image::filled(width, height, None);

@@ -134,14 +134,13 @@ impl TargetPlate {
             plate.texture = plate.looked_up(frames, Some(&shades), palettes);
         }
         if let Some(print) = print {
-            plate.complete(print);
+            plate.complete(print, palettes);
         }
         Some(plate)
     }
 
-    /// Puts what is printed where too few frames agree on what they see, or on something else: places that the object
-    /// nearly always covers are known all the same, and its foot is not taken for the print beside it. Ink and paper look as they do where they are seen.
-    fn complete(&mut self, print: &Print) {
+    /// Puts what is printed where too few frames agree on what they see, or on something else.
+    fn complete(&mut self, print: &Print, palettes: &Palettes) {
         let width = self.texture.width();
         let place = |at: usize| [at % width, at / width].map(|v| v as f64 + 0.5);
         let dark: Vec<Option<f32>> = (0..self.texture.pixels().len())
@@ -151,32 +150,7 @@ impl TargetPlate {
                 print.dark_share([self.origin[0] + u * self.texel, self.origin[1] + v * self.texel], self.texel)
             })
             .collect();
-        let seen = |share: f32| -> Option<Cluster> {
-            let alike =
-                self.texture.pixels().iter().zip(&dark).filter(|(t, d)| **d == Some(share) && t.support >= SURE);
-            let mut levels: [Vec<f32>; 4] = Default::default();
-            for (texel, _) in alike {
-                (0..3).for_each(|c| levels[c].push(texel.colour[c]));
-                levels[3].push(texel.spread);
-            }
-            let [r, g, b, spread] = levels.map(median);
-            Some(Cluster { colour: [r?, g?, b?], spread: spread?, support: SURE })
-        };
-        let (Some(paper), Some(ink)) = (seen(0.0), seen(1.0)) else { return };
-        let printed: Vec<Option<[f32; 3]>> = dark
-            .iter()
-            .map(|dark| dark.map(|d| [0, 1, 2].map(|c| paper.colour[c] + (ink.colour[c] - paper.colour[c]) * d)))
-            .collect();
-        let contact = Contact::of(&self.texture, &printed);
-        for (at, (texel, printed)) in self.texture.pixels_mut().iter_mut().zip(&printed).enumerate() {
-            let Some(printed) = *printed else { continue };
-            let light = contact.at(at % width, at / width);
-            let colour = printed.map(|v| v * light);
-            let is_seen = texel.support >= SURE && !texel.is_covered();
-            if !is_seen || !is_print_in(&texel.colour, &colour, &PRINT_LIGHT) {
-                *texel = Cluster { colour, spread: paper.spread.max(ink.spread), support: SURE };
-            }
-        }
+        put_print(&mut self.texture, &dark, palettes);
     }
 
     /// Colour and spread at a place on the plane, or [`Cluster::COVERED`]; `None` where too little is known.
@@ -266,8 +240,40 @@ impl TargetPlate {
     }
 }
 
-/// Where a place is covered, what is beside it and has the object's colours is the object, too: a foot that the hull so
-/// far does not reach.
+/// Puts print, `dark` where given the share of ink, where it is not seen or something else is: places that the object
+/// nearly always covers are known all the same, and its foot is not taken for the print beside it. Ink and paper look as
+/// they do where they are seen, in the light that falls there.
+pub(super) fn put_print(texture: &mut Image<Cluster>, dark: &[Option<f32>], palettes: &Palettes) {
+    let seen = |share: f32| -> Option<Cluster> {
+        let alike = texture.pixels().iter().zip(dark).filter(|(t, d)| **d == Some(share) && t.support >= SURE);
+        let mut levels: [Vec<f32>; 4] = Default::default();
+        for (texel, _) in alike {
+            (0..3).for_each(|c| levels[c].push(texel.colour[c]));
+            levels[3].push(texel.spread);
+        }
+        let [r, g, b, spread] = levels.map(median);
+        Some(Cluster { colour: [r?, g?, b?], spread: spread?, support: SURE })
+    };
+    let (Some(paper), Some(ink)) = (seen(0.0), seen(1.0)) else { return };
+    let mixed = |dark: f32| [0, 1, 2].map(|c| paper.colour[c] + (ink.colour[c] - paper.colour[c]) * dark);
+    let printed: Vec<Option<[f32; 3]>> = dark.iter().map(|dark| dark.map(mixed)).collect();
+    let is_object = |texel: &Cluster| palettes.log_odds(&texel.colour) > 0.0;
+    let bare = texture.map(|texel| if is_object(&texel) { Cluster::COVERED } else { texel });
+    let contact = Contact::of(&bare, &printed);
+    let width = texture.width();
+    for (at, (texel, printed)) in texture.pixels_mut().iter_mut().zip(&printed).enumerate() {
+        let Some(printed) = *printed else { continue };
+        let light = contact.at(at % width, at / width);
+        let colour = printed.map(|v| v * light);
+        let is_seen = texel.support >= SURE && !texel.is_covered();
+        if !is_seen || !is_print_in(&texel.colour, &colour, &PRINT_LIGHT) {
+            *texel = Cluster { colour, spread: paper.spread.max(ink.spread), support: SURE };
+        }
+    }
+}
+
+/// Where a place is covered, what is seen beside it and has not the colours of what is around, in light or shade, is the
+/// object, too: a foot that the hull so far does not reach.
 pub(super) fn cover_feet(seen: &mut Image<Cluster>, palettes: &Palettes) {
     let (width, height) = (seen.width(), seen.height());
     let mut open: Vec<usize> = (0..width * height).filter(|&at| seen.pixels()[at].is_covered()).collect();
@@ -279,7 +285,8 @@ pub(super) fn cover_feet(seen: &mut Image<Cluster>, palettes: &Palettes) {
         let below = (y + 1 < height).then(|| at + width);
         for next in [left, right, above, below].into_iter().flatten() {
             let texel = &mut seen.pixels_mut()[next];
-            if !texel.is_covered() && palettes.log_odds(&texel.colour) > OF_A_FOOT {
+            let is_seen = texel.support > 0 && !texel.is_covered();
+            if is_seen && palettes.log_odds(&texel.colour) > OF_A_FOOT {
                 *texel = Cluster::COVERED;
                 open.push(next);
             }

@@ -21,7 +21,7 @@ const MARGIN: f64 = 12.0;
 const PALETTE_SAMPLES: usize = 2000;
 
 /// Of the (encoded) light on what is around the object, what its shadow may leave.
-const SHADES: [f32; 5] = [0.5, 0.6, 0.7, 0.8, 0.9];
+const SHADOWS: [f32; 5] = [0.5, 0.6, 0.7, 0.8, 0.9];
 
 /// Reach of the blur that takes the noise of single pixels from odds, pixels (standard deviation).
 const EVEN: f64 = 1.1;
@@ -180,7 +180,7 @@ impl Scene<'_> {
         let seen = |side: usize| parts.iter().flat_map(move |p: &Part| p.colours[side].iter().copied());
         let object = Palette::learned(seen(0));
         // Under the object nothing else is seen of what is around it than its shade.
-        let in_shade = seen(1).enumerate().map(|(i, colour)| colour.map(|v| v * SHADES[i % SHADES.len()]));
+        let in_shade = seen(1).enumerate().map(|(i, colour)| colour.map(|v| v * SHADOWS[i % SHADOWS.len()]));
         let surroundings = Palette::learned(seen(1).chain(in_shade));
         let palettes = Palettes { object, surroundings };
         Ok(judgement::agreed(parts, belief, palettes, round.resolution, round.dissent))
@@ -248,8 +248,10 @@ impl Scene<'_> {
         let target = target.as_ref().map(|(seen, shade)| (seen, shade));
         let hull = hull.filter(|_| !round.is_guess);
         let size = (cutout.width, cutout.height);
-        let odds_given =
-            |nearby: Option<&Nearby>| odds::of(&picture, room.as_ref(), target, &belief.palettes, nearby, size);
+        let deepest = odds::DEEPEST_SHADOW[usize::from(hull.is_some())];
+        let odds_given = |nearby: Option<&Nearby>| {
+            odds::of(&picture, room.as_ref(), target, &belief.palettes, nearby, deepest, size)
+        };
         let nearby = hull.as_ref().map(|h| {
             let unexplained = without_explained(h, &blur(&odds_given(None).log_odds, EVEN));
             Nearby::of(&picture, &unexplained, longest)
