@@ -257,7 +257,7 @@ pub(super) fn put_print(texture: &mut Image<Cluster>, dark: &[Option<f32>], pale
     let (Some(paper), Some(ink)) = (seen(0.0), seen(1.0)) else { return };
     let mixed = |dark: f32| [0, 1, 2].map(|c| paper.colour[c] + (ink.colour[c] - paper.colour[c]) * dark);
     let printed: Vec<Option<[f32; 3]>> = dark.iter().map(|dark| dark.map(mixed)).collect();
-    let is_object = |texel: &Cluster| palettes.log_odds(&texel.colour) > 0.0;
+    let is_object = |texel: &Cluster| palettes.log_odds(&texel.colour) > SUSPICIOUS;
     let bare = texture.map(|texel| if is_object(&texel) { Cluster::COVERED } else { texel });
     let contact = Contact::of(&bare, &printed);
     let width = texture.width();

@@ -381,7 +381,7 @@ fn a_foot_is_not_taken_for_the_print_beside_it() {
     let (paper, ink, foot) = ([210.0, 208.0, 200.0], [42.0, 42.0, 40.0], [70.0, 62.0, 55.0]);
     let plain = |colour: [f32; 3]| cluster::Cluster { colour, spread: 3.0, support: 9 };
     let places = || (0..120).flat_map(|y| (0..120).map(move |x| (x, y)));
-    let dark = |x: usize, y: usize| if (x / 24 + y / 24) % 2 == 0 { 0.0 } else { 1.0 };
+    let dark = |x: usize, y: usize| if (x / 24 + y / 24).is_multiple_of(2) { 0.0 } else { 1.0 };
     let shadow = |x: usize| 1.0 - 0.55 * (-0.5 * ((x as f32 - 96.0) / 12.0).powi(2)).exp();
     let is_foot = |x: usize, y: usize| (52..64).contains(&x) && (52..64).contains(&y);
     let print = |x: usize, y: usize| if dark(x, y) == 0.0 { paper } else { ink }.map(|v: f32| v * shadow(x));
