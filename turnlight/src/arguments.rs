@@ -173,13 +173,13 @@ pub(crate) struct ViewWindowArgs {
     #[arg(long, value_name = "CAPTURE", conflicts_with = "web")]
     pub(crate) capture: Option<PathBuf>,
     /// Size of the window
-    #[arg(long, value_name = "WxH", default_value = "1200x800", value_parser = size)]
+    #[arg(long, value_name = "WxH", default_value = "1200x800", value_parser = size, conflicts_with = "web")]
     pub(crate) size: [usize; 2],
     /// Panels to unfold: facets, directions, basis, light, capture, times, keys; none: the picture alone
-    #[arg(long, value_name = "LIST", default_value = "times,keys", value_parser = panels)]
+    #[arg(long, value_name = "LIST", default_value = "times,keys", value_parser = panels, conflicts_with = "web")]
     pub(crate) panels: Panels,
     /// Who draws; pictures differ by a level at most, nearly everywhere
-    #[arg(long, value_enum, default_value = "auto")]
+    #[arg(long, value_enum, default_value = "auto", conflicts_with = "web")]
     pub(crate) renderer: RendererArg,
     /// Write the first picture to this file and close
     #[arg(long, value_name = "FILE.png", conflicts_with = "web")]

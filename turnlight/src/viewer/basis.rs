@@ -21,10 +21,14 @@ pub fn layers(model: &Model) -> Option<&Layers> {
     }
 }
 
-/// The layers, no side longer than `side`. All but those of photographs are stretched about their mean, so that what they
-/// change can be seen.
+/// The layers, reduced until no side is longer than `side`, as far as the shorter one allows. Those of DynTex after the
+/// first are stretched about their mean, so that what they change can be seen.
 pub fn thumbnails(model: &Model, layers: &Layers, side: usize) -> Vec<Image<[u8; 3]>> {
-    let small = |texels: &Image<[u8; 3]>| reduced(texels, texels.width().max(texels.height()).div_ceil(side.max(1)));
+    let small = |texels: &Image<[u8; 3]>| {
+        let (width, height) = (texels.width(), texels.height());
+        // Of a thin atlas something stays.
+        reduced(texels, width.max(height).div_ceil(side.max(1)).min(width.min(height)).max(1))
+    };
     let thumbnail = |(k, layer): (usize, &Layer)| {
         let small = small(&layer.texels);
         if k > 0 && model.method == Method::DynTex { stretched(&small) } else { small }
