@@ -1072,6 +1072,15 @@ mod tests {
     }
 
     #[test]
+    fn a_browser_takes_nothing_that_is_for_a_window() {
+        let read = |args: &[&str]| Cli::try_parse_from([&["turnlight", "view", "m.glb"], args].concat());
+        assert!(read(&["--web"]).is_ok());
+        for option in [["--size", "40x30"], ["--panels", "none"], ["--renderer", "cpu"], ["--screenshot", "s.png"]] {
+            assert!(read(&option).is_ok() && read(&[&option[..], &["--web"]].concat()).is_err(), "{option:?}");
+        }
+    }
+
+    #[test]
     fn values_out_of_range_are_refused() {
         for text in ["nan", "inf", "1e9", "", "x"] {
             assert!(grow(text).is_err(), "{text}");
