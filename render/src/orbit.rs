@@ -111,11 +111,13 @@ impl Orbit {
         (level * cos_a + across * sin_a) * cos_e + up * sin_e
     }
 
-    /// The object follows a pointer that moved by so many pixels (right, down) of a frame `height` high within `dt` seconds.
+    /// The object follows a pointer that moved by so many pixels (right, down) of a frame `height` high within `dt` seconds;
+    /// a wheel that was turned goes on.
     pub fn drag(&mut self, [right, down]: [f64; 2], height: usize, dt: f64) {
         let turn = TURN_PER_HEIGHT / height.max(1) as f64;
         let moved = [-right * turn, down * turn];
-        self.add([moved[0], moved[1], 0.0]);
+        let folds = self.coast(2, dt, 0.0);
+        self.add([moved[0], moved[1], folds]);
         let share = if dt > 0.0 { -(-dt / GRIP_S).exp_m1() } else { 0.0 };
         for k in 0..2 {
             let now = if dt > 0.0 { moved[k] / dt } else { 0.0 };
@@ -126,16 +128,18 @@ impl Orbit {
     /// Lets `dt` seconds pass while nobody drags; `push` is the speed that held keys ask for, as the eye's own: radians of
     /// azimuth and elevation, e-folds of distance a second.
     pub fn advance(&mut self, dt: f64, push: [f64; 3]) {
-        let mut way = [0.0; 3];
-        for k in 0..3 {
-            let (left, over) = ((-dt / COAST_S[k]).exp(), self.speed[k] - push[k]);
-            way[k] = push[k] * dt + over * COAST_S[k] * (1.0 - left);
-            self.speed[k] = push[k] + over * left;
-        }
+        let way = [0, 1, 2].map(|k| self.coast(k, dt, push[k]));
         self.add(way);
         if push == [0.0; 3] && self.speed.iter().all(|v| v.abs() < REST) {
             self.speed = [0.0; 3];
         }
+    }
+
+    /// The way of one coordinate in `dt` seconds towards the speed `push`, which becomes its own.
+    fn coast(&mut self, k: usize, dt: f64, push: f64) -> f64 {
+        let (left, over) = ((-dt / COAST_S[k]).exp(), self.speed[k] - push);
+        self.speed[k] = push + over * left;
+        push * dt + over * COAST_S[k] * (1.0 - left)
     }
 
     /// Comes nearer by `steps` notches of a wheel, softly; negative goes away.
@@ -298,6 +302,18 @@ mod tests {
         orbit.speed[0] = 1.5;
         (0..600).for_each(|_| orbit.advance(0.01, [0.0; 3]));
         assert!((orbit.place().azimuth - 1.5 * COAST_S[0]).abs() < REST, "{:?}", orbit.place());
+    }
+
+    #[test]
+    fn a_wheel_comes_as_near_during_a_drag() {
+        let (mut dragged, mut free) = (orbit(), orbit());
+        [&mut dragged, &mut free].map(|orbit| orbit.wheel(2.0));
+        for _ in 0..50 {
+            dragged.drag([3.0, 1.0], 480, 0.01);
+            free.advance(0.01, [0.0; 3]);
+        }
+        let (zoom, known) = (dragged.place().zoom, free.place().zoom);
+        assert!(known < 0.8 && (zoom - known).abs() < 1e-3, "{zoom} {known}");
     }
 
     #[test]

@@ -173,13 +173,13 @@ pub(crate) struct ViewWindowArgs {
     #[arg(long, value_name = "CAPTURE", conflicts_with = "web")]
     pub(crate) capture: Option<PathBuf>,
     /// Size of the window
-    #[arg(long, value_name = "WxH", default_value = "1200x800", value_parser = size)]
+    #[arg(long, value_name = "WxH", default_value = "1200x800", value_parser = size, conflicts_with = "web")]
     pub(crate) size: [usize; 2],
     /// Panels to unfold: facets, directions, basis, light, capture, times, keys; none: the picture alone
-    #[arg(long, value_name = "LIST", default_value = "times,keys", value_parser = panels)]
+    #[arg(long, value_name = "LIST", default_value = "times,keys", value_parser = panels, conflicts_with = "web")]
     pub(crate) panels: Panels,
     /// Who draws; pictures differ by a level at most, nearly everywhere
-    #[arg(long, value_enum, default_value = "auto")]
+    #[arg(long, value_enum, default_value = "auto", conflicts_with = "web")]
     pub(crate) renderer: RendererArg,
     /// Write the first picture to this file and close
     #[arg(long, value_name = "FILE.png", conflicts_with = "web")]
@@ -1069,6 +1069,15 @@ mod tests {
     #[test]
     fn the_command_line_is_consistent() {
         Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn a_browser_takes_nothing_that_is_for_a_window() {
+        let read = |args: &[&str]| Cli::try_parse_from([&["turnlight", "view", "m.glb"], args].concat());
+        assert!(read(&["--web"]).is_ok());
+        for option in [["--size", "40x30"], ["--panels", "none"], ["--renderer", "cpu"], ["--screenshot", "s.png"]] {
+            assert!(read(&option).is_ok() && read(&[&option[..], &["--web"]].concat()).is_err(), "{option:?}");
+        }
     }
 
     #[test]

@@ -98,6 +98,23 @@ impl OutputFolder {
         };
         replace().map_err(|source| cannot_write(&self.target, source))
     }
+
+    /// Makes the folder appear at the first of `places` where there is nothing, and says where; replaces nothing.
+    ///
+    /// # Errors
+    /// Names the place and what the system said; where no place is free.
+    pub fn finish_at_first_free(self, places: impl IntoIterator<Item = PathBuf>) -> Result<PathBuf, Error> {
+        for place in places.into_iter().filter(|place| !place.exists()) {
+            match fs::rename(self.folder.path(), &place) {
+                Ok(()) => return Ok(place),
+                // Somebody was quicker; no system puts a folder in place of one that holds anything.
+                Err(_) if place.exists() => {}
+                Err(source) => return Err(cannot_write(&place, source)),
+            }
+        }
+        let fault = "and all names like it are taken; move some of these folders away";
+        Err(Error::Failed(format!("{}: {fault}", self.target.display())))
+    }
 }
 
 /// Lies in every folder we write, so that a second run may replace it and nobody else's folder goes.
@@ -168,6 +185,22 @@ mod tests {
         fs::write(foreign.join("thesis.tex"), "x").unwrap();
         assert!(OutputFolder::create(&foreign).is_err());
         assert!(OutputFolder::create(&foreign.join("thesis.tex")).is_err());
+    }
+
+    #[test]
+    fn folders_begun_at_one_place_end_at_places_of_their_own() {
+        let place = tempfile::tempdir().unwrap();
+        let places = || ["a", "b"].map(|name| place.path().join(name));
+        let begun = [b"1", b"2", b"3"].map(|content| {
+            let folder = OutputFolder::create(&places()[0]).unwrap();
+            folder.write("x.txt", content).unwrap();
+            folder
+        });
+        let [first, second, third] = begun.map(|folder| folder.finish_at_first_free(places()));
+        assert_eq!([first.unwrap(), second.unwrap()], places());
+        assert!(third.is_err());
+        assert_eq!(places().map(|path| fs::read(path.join("x.txt")).unwrap()), [b"1", b"2"]);
+        assert_eq!(fs::read_dir(place.path()).unwrap().count(), 2);
     }
 
     #[test]

@@ -35,7 +35,8 @@ pub struct Projector<'a> {
     pinned: Vec<usize>,
     #[cfg(feature = "gpu")]
     hardware: Option<Hardware<'a>>,
-    device: String,
+    /// What the CPU is called.
+    cpu: String,
     note: Option<String>,
 }
 
@@ -45,6 +46,7 @@ pub struct Projector<'a> {
 struct Hardware<'a> {
     renderer: gpu::Renderer<'a>,
     options: RenderOptions,
+    name: String,
 }
 
 impl<'a> Projector<'a> {
@@ -72,7 +74,7 @@ impl<'a> Projector<'a> {
             pinned: Vec::new(),
             #[cfg(feature = "gpu")]
             hardware: None,
-            device: of_cpu(),
+            cpu: format!("cpu, {} threads", rayon::current_num_threads()),
             note: None,
         };
         #[cfg(feature = "gpu")]
@@ -85,7 +87,11 @@ impl<'a> Projector<'a> {
 
     /// What draws, in a few words.
     pub fn device(&self) -> &str {
-        &self.device
+        #[cfg(feature = "gpu")]
+        if let Some(hardware) = self.hardware.as_ref().filter(|_| self.pinned.is_empty()) {
+            return &hardware.name;
+        }
+        &self.cpu
     }
 
     /// What the user should know, once: why the CPU draws although it was not asked to.
@@ -129,9 +135,9 @@ impl<'a> Projector<'a> {
 
 #[cfg(feature = "gpu")]
 impl<'a> Projector<'a> {
-    fn handed_over(self, found: Result<(Hardware<'a>, String), gpu::GpuError>) -> Self {
+    fn handed_over(self, found: Result<Hardware<'a>, gpu::GpuError>) -> Self {
         match found {
-            Ok((hardware, name)) => Self { hardware: Some(hardware), device: format!("gpu, {name}"), ..self },
+            Ok(hardware) => Self { hardware: Some(hardware), ..self },
             Err(fault) => Self { note: Some(format!("the CPU draws: {fault}")), ..self },
         }
     }
@@ -143,7 +149,6 @@ impl<'a> Projector<'a> {
             Ok(frame) => Some(frame),
             Err(fault) => {
                 self.hardware = None;
-                self.device = of_cpu();
                 self.note = Some(format!("the CPU draws: {fault}"));
                 None
             }
@@ -153,13 +158,12 @@ impl<'a> Projector<'a> {
 
 #[cfg(feature = "gpu")]
 impl<'a> Hardware<'a> {
-    /// With the adapter's name.
     fn new(
         scene: &'a Scene,
         coats: &'a [Option<Coats<'a>>],
         options: RenderOptions,
         choice: Choice,
-    ) -> Result<(Self, String), gpu::GpuError> {
+    ) -> Result<Self, gpu::GpuError> {
         let device = gpu::Device::headless()?;
         if choice == Choice::Auto && device.is_software() {
             let fault = format!("{} is itself a program on the CPU", device.name());
@@ -167,14 +171,10 @@ impl<'a> Hardware<'a> {
         }
         let objects = playback::objects(scene, coats);
         let renderer = gpu::Renderer::of_scene(&device, &objects, gpu::Blend::fastest(&device))?;
-        Ok((Self { renderer, options }, device.name().to_owned()))
+        Ok(Self { renderer, options, name: format!("gpu, {}", device.name()) })
     }
 
     fn frame(&mut self, camera: &Camera, lighting: &Lighting) -> Result<Image<[u8; 4]>, gpu::GpuError> {
         self.renderer.render(&gpu::Shot { camera, lighting: Some(lighting), options: self.options })
     }
-}
-
-fn of_cpu() -> String {
-    format!("cpu, {} threads", rayon::current_num_threads())
 }

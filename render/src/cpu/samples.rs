@@ -192,7 +192,7 @@ impl Samples {
     #[inline(always)]
     fn reached(&self, low: f64, high: f64, range: &Range<usize>) -> Range<usize> {
         let n = self.per_side as f64;
-        // Casts saturate: the infinite bounds of a face behind the camera give the whole range.
+        // Casts saturate: the infinite bounds of a face through the camera's plane reach the ends of the range.
         let first = ((low * n - 0.5).ceil() as usize).clamp(range.start, range.end);
         let last = ((high * n - 0.5).floor() + 1.0) as usize;
         first..last.clamp(first, range.end)

@@ -35,9 +35,9 @@ pub(super) struct EdgeFace {
     pub(super) part: u32,
     /// Index in the part's mesh.
     pub(super) face: u32,
-    /// Ideal pixels [x, y] that may be covered: lowest.
+    /// Ideal pixels [x, y] that may be covered: lowest; infinite where a face through the camera's plane runs there.
     pub(super) low: [f64; 2],
-    /// Ideal pixels [x, y] that may be covered: highest.
+    /// Ideal pixels [x, y] that may be covered: highest; infinite likewise.
     pub(super) high: [f64; 2],
 }
 

@@ -21,15 +21,20 @@ pub fn layers(model: &Model) -> Option<&Layers> {
     }
 }
 
-/// The layers, no side longer than `side`. All but those of photographs are stretched about their mean, so that what they
-/// change can be seen.
+/// The layers, reduced until no side is longer than `side`, as far as the shorter one allows. Those of DynTex after the
+/// first are stretched about their mean, so that what they change can be seen.
 pub fn thumbnails(model: &Model, layers: &Layers, side: usize) -> Vec<Image<[u8; 3]>> {
-    let small = |texels: &Image<[u8; 3]>| reduced(texels, texels.width().max(texels.height()).div_ceil(side.max(1)));
     let thumbnail = |(k, layer): (usize, &Layer)| {
-        let small = small(&layer.texels);
+        let small = small(&layer.texels, side);
         if k > 0 && model.method == Method::DynTex { stretched(&small) } else { small }
     };
     layers.layers.iter().enumerate().map(thumbnail).collect()
+}
+
+/// Of a thin picture something stays: its shorter side is a pixel at least.
+fn small(texels: &Image<[u8; 3]>, side: usize) -> Image<[u8; 3]> {
+    let (width, height) = (texels.width(), texels.height());
+    reduced(texels, width.max(height).div_ceil(side.max(1)).min(width.min(height)))
 }
 
 /// Three standard deviations fill the range.
@@ -53,4 +58,19 @@ pub fn coefficients(facet: &FacetWeights, eye: &Point3<f64>) -> Vec<Coefficient>
         Coefficient { asked: asked.into(), range: [low - margin, high + margin] }
     };
     facet.at(eye).iter().enumerate().map(of_layer).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_thin_picture_keeps_its_shorter_side() {
+        for (size, reduced) in [([600, 400], [200, 133]), ([600, 2], [300, 1]), ([1, 900], [1, 900]), ([0, 0], [0, 0])]
+        {
+            let small = small(&Image::filled(size[0], size[1], [7; 3]), 256);
+            assert_eq!([small.width(), small.height()], reduced);
+            assert!(small.pixels().iter().all(|pixel| *pixel == [7; 3]));
+        }
+    }
 }

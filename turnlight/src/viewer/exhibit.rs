@@ -16,7 +16,7 @@ pub struct Exhibit {
     pub facets: Scene,
     /// The same in the colours of how many layers a facet has.
     pub ranks: Scene,
-    /// The most that any has.
+    /// The most that any has; of lumigraphs, rays.
     pub most_layers: usize,
 }
 
@@ -24,7 +24,9 @@ impl Exhibit {
     /// A scene by this name.
     pub fn new(name: String, scene: Scene) -> Self {
         let most_layers = most_layers(&scene);
-        let share = |rank: u16| f64::from(rank) / most_layers.max(1) as f64;
+        // From one to the most.
+        let most = most_layers.saturating_sub(1).max(1) as f64;
+        let share = |rank: u16| f64::from(rank.saturating_sub(1)) / most;
         Self {
             name,
             facets: painted(&scene, facets, |facet| of_facet(usize::from(facet))),

@@ -45,7 +45,7 @@ pub fn of_facet(index: usize) -> [u8; 3] {
     [channel(5.0), channel(3.0), channel(1.0)].map(|c| c.round() as u8)
 }
 
-/// The colour of a share from 0 to 1 of the most layers; what is no number is as 0.
+/// The colour of a place from 0, one layer, to 1, the most; what is no number is as 0.
 pub fn of_rank(share: f64) -> [u8; 3] {
     along(&RAMP, share)
 }

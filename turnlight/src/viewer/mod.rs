@@ -240,7 +240,7 @@ impl<'a> Viewer<'a> {
         self.drawn.iter().any(|drawn| drawn.coats.iter().any(Option::is_some))
     }
 
-    /// What the user should know, each once.
+    /// What the user should know, since this was last asked.
     pub fn take_notes(&mut self) -> Vec<String> {
         std::mem::take(&mut self.notes)
     }
@@ -278,7 +278,7 @@ impl<'a> Viewer<'a> {
             camera: self.camera(size),
             sides: (self.left, self.right, self.divider),
             light: (self.lamp, self.stops),
-            photograph: photograph.then(|| self.nearest_photograph()).flatten(),
+            photograph: photograph.then(|| self.nearest_photograph(&self.camera(size))).flatten(),
             pins: self.drawn.iter().map(|drawn| drawn.pins.clone()).collect(),
         }
     }
@@ -311,7 +311,7 @@ impl<'a> Viewer<'a> {
 
     fn photograph(&mut self, camera: &Camera) -> Image<[u8; 4]> {
         let centre = self.centre;
-        let seen = self.nearest_photograph().zip(self.photographs.as_mut()).map(|(nearest, photographs)| {
+        let seen = self.nearest_photograph(camera).zip(self.photographs.as_mut()).map(|(nearest, photographs)| {
             let from = photographs.camera(nearest).copied().unwrap_or(*camera);
             photographs.picture(nearest).map(|picture| through_plane(picture, &from, &centre, camera, BACKGROUND))
         });
@@ -320,7 +320,7 @@ impl<'a> Viewer<'a> {
 
     fn difference_seen(&mut self, exhibit: usize, camera: &Camera) -> Image<[u8; 4]> {
         let centre = self.centre;
-        let seen = self.difference(exhibit).map(|found| {
+        let seen = self.difference(exhibit, camera).map(|found| {
             found.map(|(from, difference)| through_plane(&difference.colours, &from, &centre, camera, BACKGROUND))
         });
         self.or_nothing(seen, camera)
@@ -360,9 +360,11 @@ impl Viewer<'_> {
         self.photographs.as_ref()
     }
 
-    /// The one taken from where the eye is, or from the direction nearest to it.
-    pub fn nearest_photograph(&self) -> Option<usize> {
-        self.visited.or_else(|| self.photographs.as_ref()?.nearest(&self.orbit.camera([1, 1]).center(), &self.centre))
+    /// The one that was visited, where `camera` is still at its place; else the one taken from the direction nearest to it.
+    pub fn nearest_photograph(&self, camera: &Camera) -> Option<usize> {
+        let photographs = self.photographs.as_ref()?;
+        let is_here = |k: &usize| photographs.camera(*k).is_some_and(|visited| visited.center() == camera.center());
+        self.visited.filter(is_here).or_else(|| photographs.nearest(&camera.center(), &self.centre))
     }
 
     /// Goes to where a photograph was taken; there both fill the frame alike.
@@ -378,13 +380,13 @@ impl Viewer<'_> {
         self.visited
     }
 
-    /// How far an exhibit is from the photograph nearest to the eye, and the camera of its pixels; `None` without
+    /// How far an exhibit is from the photograph nearest to `camera`, and the camera of its pixels; `None` without
     /// photographs, or where the two have no pixel in common.
     ///
     /// # Errors
     /// As [`Photographs::picture`].
-    pub fn difference(&mut self, exhibit: usize) -> Option<Result<(Camera, &Difference), Error>> {
-        let photograph = self.nearest_photograph()?;
+    pub fn difference(&mut self, exhibit: usize, camera: &Camera) -> Option<Result<(Camera, &Difference), Error>> {
+        let photograph = self.nearest_photograph(camera)?;
         let camera = *self.photographs.as_ref()?.camera(photograph)?;
         let factor = camera.intrinsics.width.max(camera.intrinsics.height).div_ceil(LONGEST_DIFFERENCE).max(1);
         let camera = camera.downscaled(factor);
@@ -435,10 +437,10 @@ impl<'a> Viewer<'a> {
         Some((&drawn.exhibit.scene.models[placed.model], placed.pose, picked))
     }
 
-    /// Where the chosen facet was photographed from; of a lumigraph, where its rays come from.
-    pub fn dome(&self, exhibit: usize) -> Option<Dome> {
+    /// Where the chosen facet was photographed from, as `camera` sees it; of a lumigraph, where its rays come from.
+    pub fn dome(&self, exhibit: usize, camera: &Camera) -> Option<Dome> {
         let (model, pose, picked) = self.picked_model(exhibit)?;
-        let eye = pose.to_object(&self.camera([64, 48]).center());
+        let eye = pose.to_object(&camera.center());
         let axes = Axes::about(&(pose.rotation.transpose() * self.orbit.up()));
         match &model.appearance {
             Appearance::Layers(layers) => {
@@ -451,11 +453,11 @@ impl<'a> Viewer<'a> {
         }
     }
 
-    /// The weights of the chosen facet's layers; of no lumigraph.
-    pub fn coefficients(&self, exhibit: usize) -> Option<Vec<basis::Coefficient>> {
+    /// The weights of the chosen facet's layers, as `camera` sees it; of no lumigraph.
+    pub fn coefficients(&self, exhibit: usize, camera: &Camera) -> Option<Vec<basis::Coefficient>> {
         let (model, pose, picked) = self.picked_model(exhibit)?;
         let facet = basis::layers(model)?.facets.get(picked.facet)?;
-        Some(basis::coefficients(facet, &pose.to_object(&self.camera([64, 48]).center())))
+        Some(basis::coefficients(facet, &pose.to_object(&camera.center())))
     }
 
     /// Weights held fast in an exhibit, with the object whose they are.
@@ -497,21 +499,25 @@ impl<'a> Drawn<'a> {
     }
 
     fn compared(&mut self) -> &mut ScenePlayer<'a> {
-        if self.compared.is_none() {
-            let objects = playback::objects(&self.exhibit.scene, self.coats);
-            self.compared = Some(ScenePlayer::new(&objects, RenderOptions::default()));
-            self.hand_over_pins();
-        }
-        self.compared.get_or_insert_with(|| ScenePlayer::new(&[], RenderOptions::default()))
+        let (scene, coats, pins) = (&self.exhibit.scene, self.coats, &self.pins);
+        self.compared.get_or_insert_with(|| {
+            let mut player = ScenePlayer::new(&playback::objects(scene, coats), RenderOptions::default());
+            (0..scene.objects.len()).for_each(|object| player.pin(object, &pins_of(pins, object)));
+            player
+        })
     }
 
     fn hand_over_pins(&mut self) {
         for object in 0..self.exhibit.scene.objects.len() {
-            let pins: Vec<Pin> = self.pins.iter().filter(|(o, _)| *o == object).map(|(_, pin)| *pin).collect();
+            let pins = pins_of(&self.pins, object);
             self.projector.pin(object, &pins);
             self.compared.iter_mut().for_each(|player| player.pin(object, &pins));
         }
     }
+}
+
+fn pins_of(pins: &[(usize, Pin)], object: usize) -> Vec<Pin> {
+    pins.iter().filter(|(o, _)| *o == object).map(|(_, pin)| *pin).collect()
 }
 
 fn in_false_colour(scene: &crate::scene::Scene) -> ScenePlayer<'_> {

@@ -14,12 +14,14 @@ pub struct Photographs {
     frames: Vec<Frame>,
     /// The last ones read, the last first.
     kept: Vec<(usize, Image<[u8; 3]>)>,
+    /// The last one asked for, where it cannot be read, and why: it is not tried again at every frame.
+    failed: Option<(usize, String)>,
 }
 
 impl Photographs {
     /// Those of a capture; none is read yet.
     pub fn new(capture: Capture) -> Self {
-        Self { frames: capture.frames, kept: Vec::new() }
+        Self { frames: capture.frames, kept: Vec::new(), failed: None }
     }
 
     /// How many there are.
@@ -54,15 +56,19 @@ impl Photographs {
         known.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(k, _)| k)
     }
 
-    /// Its pixels.
+    /// Its pixels. One that cannot be read is tried again after another was asked for.
     ///
     /// # Errors
     /// Names the file that cannot be read, or is not of the size the capture says.
     pub fn picture(&mut self, index: usize) -> Result<&Image<[u8; 3]>, Error> {
+        self.failed = self.failed.take().filter(|(failed, _)| *failed == index);
+        if let Some((_, fault)) = &self.failed {
+            return Err(Error::Failed(fault.clone()));
+        }
         if let Some(at) = self.kept.iter().position(|(kept, _)| *kept == index) {
             self.kept[..=at].rotate_right(1);
         } else {
-            let picture = self.read(index)?;
+            let picture = self.read(index).inspect_err(|fault| self.failed = Some((index, fault.to_string())))?;
             self.kept.insert(0, (index, picture));
             let sizes = self.kept.iter().map(|(_, picture)| 3 * picture.pixels().len());
             let filled = sizes.scan(0, |sum, size| {
@@ -179,7 +185,8 @@ mod tests {
             light_direction: None,
             exposure: None,
         };
-        let mut photographs = Photographs { frames: cameras().iter().map(frame).collect(), kept: Vec::new() };
+        let frames = cameras().iter().map(frame).collect();
+        let mut photographs = Photographs { frames, kept: Vec::new(), failed: None };
         for (k, camera) in cameras().iter().enumerate() {
             let eye = Point3::from(camera.center().coords * 3.0 + Vector3::new(0.1, 0.1, 0.3));
             assert_eq!(photographs.nearest(&eye, &Point3::origin()), Some(k));

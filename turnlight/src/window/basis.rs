@@ -42,7 +42,8 @@ impl App<'_> {
             ui.weak("Click on the object to choose a facet.");
             return;
         };
-        let (Some(layers), Some(coefficients)) = (basis::layers(model), self.viewer.coefficients(current)) else {
+        let coefficients = self.viewer.coefficients(current, &self.viewer.camera(self.stage.size));
+        let (Some(layers), Some(coefficients)) = (basis::layers(model), coefficients) else {
             ui.weak("A lumigraph has rays, no layers.");
             return;
         };

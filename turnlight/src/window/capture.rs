@@ -8,7 +8,9 @@ use render::window::egui::{RichText, Ui};
 
 impl App<'_> {
     pub(super) fn capture(&mut self, ui: &mut Ui) {
-        let (Some(photographs), Some(nearest)) = (self.viewer.photographs(), self.viewer.nearest_photograph()) else {
+        let camera = self.viewer.camera(self.stage.size);
+        let nearest = self.viewer.nearest_photograph(&camera);
+        let (Some(photographs), Some(nearest)) = (self.viewer.photographs(), nearest) else {
             ui.weak("Name the photographs with --capture.");
             return;
         };
@@ -18,13 +20,13 @@ impl App<'_> {
         ui.label(if is_there { format!("At {place}") } else { format!("Nearest: {place}") });
         ui.horizontal(|ui| {
             if ui.button("Go there").clicked() {
-                self.viewer.visit(nearest);
+                self.visit(nearest);
             }
             if ui.button("Previous").clicked() {
-                self.viewer.visit((nearest + count - 1) % count);
+                self.visit((nearest + count - 1) % count);
             }
             if ui.button("Next").clicked() {
-                self.viewer.visit((nearest + 1) % count);
+                self.visit((nearest + 1) % count);
             }
         });
         let current = self.viewer.current();
@@ -37,7 +39,7 @@ impl App<'_> {
                 ui.selectable_value(&mut self.viewer.left, side, text);
             }
         });
-        let figures = match self.viewer.difference(current) {
+        let figures = match self.viewer.difference(current, &camera) {
             Some(Ok((_, found))) => {
                 format!("mean {:.2} %, root mean square {:.2} % of 255", found.mean_pct, found.rms_pct)
             }
@@ -47,5 +49,11 @@ impl App<'_> {
         ui.weak(RichText::new(figures).small());
         let most = format!("{:.0} % and more", 100.0 * FULL / 255.0);
         ramp(ui, false_colour::of_difference, ["0".to_owned(), most]);
+    }
+
+    /// Goes to where a photograph was taken, and stays there.
+    pub(super) fn visit(&mut self, photograph: usize) {
+        self.is_spinning = false;
+        self.viewer.visit(photograph);
     }
 }

@@ -10,7 +10,8 @@ const SIDE: f32 = 276.0;
 impl App<'_> {
     pub(super) fn directions(&mut self, ui: &mut Ui) {
         let current = self.viewer.current();
-        let (Some(dome), Some(picked)) = (self.viewer.dome(current), self.viewer.picked(current)) else {
+        let dome = self.viewer.dome(current, &self.viewer.camera(self.stage.size));
+        let (Some(dome), Some(picked)) = (dome, self.viewer.picked(current)) else {
             ui.weak("Click on the object to choose a facet.");
             return;
         };

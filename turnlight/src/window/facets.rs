@@ -20,7 +20,9 @@ impl App<'_> {
             ui.weak(RichText::new(figures(model)).small());
         }
         if let Some(exhibit) = self.viewer.exhibits().get(current) {
-            ramp(ui, false_colour::of_rank, ["1".to_owned(), format!("{} layers", exhibit.most_layers)]);
+            let are_rays = exhibit.scene.models.iter().all(|model| basis::layers(model).is_none());
+            let unit = if are_rays { "rays" } else { "layers" };
+            ramp(ui, false_colour::of_rank, ["1".to_owned(), format!("{} {unit}", exhibit.most_layers)]);
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use super::App;
 use crate::viewer::Side;
-use render::window::egui::{Context, Grid, Key, Modifiers, Popup, RichText, Ui, ViewportCommand};
+use render::window::egui::{Context, Event, Grid, Key, Modifiers, Popup, RichText, Ui, ViewportCommand};
 
 /// Radians, and e-folds of distance, a second that a held key asks for.
 const PUSH: f64 = 1.4;
@@ -44,13 +44,27 @@ pub(super) fn table(ui: &mut Ui) {
     });
 }
 
+/// Whether keys are for the picture, not for a widget.
+fn are_ours(context: &Context) -> bool {
+    !context.egui_wants_keyboard_input() && !Popup::is_any_open(context)
+}
+
+/// Whether a key went down; the repetitions of a held one are taken from widgets, and count for nothing.
+fn pressed(context: &Context, key: Key) -> bool {
+    let is_it = |event: &Event| matches!(event, Event::Key { key: k, pressed: true, repeat: false, .. } if *k == key);
+    context.input_mut(|i| {
+        let is_new = i.events.iter().any(is_it);
+        i.consume_key(Modifiers::NONE, key) && is_new
+    })
+}
+
 impl App<'_> {
-    /// Does what keys say; what held ones ask of the eye.
-    pub(super) fn keys(&mut self, context: &Context) -> [f64; 3] {
-        if context.egui_wants_keyboard_input() || Popup::is_any_open(context) {
-            return [0.0; 3];
+    /// Does what keys say that went down.
+    pub(super) fn keys(&mut self, context: &Context) {
+        if !are_ours(context) {
+            return;
         }
-        let pressed = |key: Key| context.input_mut(|i| i.consume_key(Modifiers::NONE, key));
+        let pressed = |key: Key| pressed(context, key);
         for (k, key) in DIGITS.into_iter().enumerate().take(self.viewer.exhibits().len()) {
             if pressed(key) {
                 self.viewer.left = Side::Method(k);
@@ -69,9 +83,9 @@ impl App<'_> {
             self.split();
         }
         if pressed(Key::N)
-            && let Some(nearest) = self.viewer.nearest_photograph()
+            && let Some(nearest) = self.viewer.nearest_photograph(&self.viewer.camera(self.stage.size))
         {
-            self.viewer.visit(nearest);
+            self.visit(nearest);
         }
         if pressed(Key::Home) {
             self.is_spinning = false;
@@ -88,11 +102,12 @@ impl App<'_> {
         if pressed(Key::Escape) {
             context.send_viewport_cmd(ViewportCommand::Close);
         }
-        self.push(context)
     }
 
-    fn push(&self, context: &Context) -> [f64; 3] {
-        let held = |keys: &[Key]| f64::from(u8::from(context.input(|i| keys.iter().any(|&key| i.key_down(key)))));
+    /// What held keys, and turning by itself, ask of the eye.
+    pub(super) fn push(&self, context: &Context) -> [f64; 3] {
+        let is_held = |keys: &[Key]| are_ours(context) && context.input(|i| keys.iter().any(|&key| i.key_down(key)));
+        let held = |keys: &[Key]| f64::from(u8::from(is_held(keys)));
         let azimuth = held(&[Key::ArrowRight]) - held(&[Key::ArrowLeft]);
         let elevation = held(&[Key::ArrowUp]) - held(&[Key::ArrowDown]);
         let distance = held(&[Key::Minus]) - held(&[Key::Plus, Key::Equals]);

@@ -36,7 +36,7 @@ impl App<'_> {
     }
 }
 
-/// From above, as the directions of view are.
+/// From above; the eye begins on the right.
 fn plot(ui: &mut Ui, azimuth_deg: &mut f64, elevation_deg: &mut f64) {
     let (rect, response) = ui.allocate_exact_size(Vec2::splat(SIDE), Sense::click_and_drag());
     let (centre, radius) = (rect.center(), 0.5 * SIDE - 8.0);

@@ -29,7 +29,7 @@ use std::path::PathBuf;
 /// How the window opens.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct WindowOptions {
-    /// What pictures and films are named by, and what the window's frame says.
+    /// What pictures and turns are named by, and what the window's frame says.
     pub name: String,
     /// Width and height, in points.
     pub size: [usize; 2],
@@ -89,7 +89,7 @@ impl Show for App<'_> {
     }
 
     fn draw(&mut self, ui: &mut Ui) {
-        let push = self.keys(ui.ctx());
+        self.keys(ui.ctx());
         if self.has_panels {
             let status = Frame::new().fill(style::PANEL).inner_margin(egui::Margin::symmetric(12, 5));
             egui::Panel::bottom("status").frame(status).show(ui, |ui| self.status(ui));
@@ -98,7 +98,7 @@ impl Show for App<'_> {
             panels.show(ui, |ui| ScrollArea::vertical().auto_shrink(false).show(ui, |ui| self.panels(ui)));
         }
         let stage = Frame::new().fill(style::BACKGROUND);
-        CentralPanel::default().frame(stage).show(ui, |ui| self.stage(ui, push));
+        CentralPanel::default().frame(stage).show(ui, |ui| self.stage(ui));
         if let Some(note) = self.viewer.take_notes().pop() {
             self.message = note;
         }

@@ -8,10 +8,14 @@ use ::capture::Camera;
 use render::film::write_png;
 use render::path::TURN_FRAMES;
 use render::window::egui::Ui;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Files of one kind and name that are told apart by number.
 const MOST_FILES: usize = 10_000;
+
+/// What names of pictures, and of folders of turns, end with.
+const PICTURE: &str = ".png";
+const TURN: &str = "-turn";
 
 /// What is being written.
 pub(super) struct Recorder {
@@ -28,7 +32,8 @@ pub(super) struct Recorder {
 /// A turn that is being written, a picture a frame of the window.
 struct Turn {
     folder: OutputFolder,
-    path: PathBuf,
+    /// What the folder is named by.
+    name: String,
     cameras: Vec<Camera>,
     next: usize,
 }
@@ -88,15 +93,15 @@ impl Recorder {
     }
 
     fn picture(&self, viewer: &mut Viewer<'_>, size: [usize; 2]) -> Result<String, Error> {
-        let path = free_name(&self.name, ".png");
+        let path = free_name(&self.name, PICTURE);
         write_png(&path, &viewer.frame(size))?;
         Ok(format!("wrote {}", path.display()))
     }
 
     fn begin(&mut self, viewer: &Viewer<'_>, size: [usize; 2]) -> Result<(), Error> {
-        let path = free_name(&self.name, "-turn");
-        let folder = OutputFolder::create(&path)?;
-        self.turn = Some(Turn { folder, path, cameras: viewer.orbit().turn(TURN_FRAMES, size), next: 0 });
+        let folder = OutputFolder::create(&free_name(&self.name, TURN))?;
+        let cameras = viewer.orbit().turn(TURN_FRAMES, size);
+        self.turn = Some(Turn { folder, name: self.name.clone(), cameras, next: 0 });
         Ok(())
     }
 }
@@ -109,8 +114,8 @@ enum Written {
 impl Turn {
     fn advance(mut self, viewer: &mut Viewer<'_>) -> Result<Written, Error> {
         let Some(camera) = self.cameras.get(self.next) else {
-            self.folder.finish()?;
-            return Ok(Written::All(self.path));
+            // Another window may have taken the name that was free at the start.
+            return Ok(Written::All(self.folder.finish_at_first_free(numbered(&self.name, TURN))?));
         };
         let place = self.folder.place(format!("{:04}.png", self.next))?;
         write_png(&place, &viewer.frame_of(camera))?;
@@ -119,10 +124,15 @@ impl Turn {
     }
 }
 
-/// `NAME-001.png` and so on, the first that is not there.
+/// `NAME-001.png` and so on.
+fn numbered(name: &str, end: &str) -> impl Iterator<Item = PathBuf> {
+    (1..=MOST_FILES).map(move |k| PathBuf::from(format!("{name}-{k:03}{end}")))
+}
+
+/// The first of them that is not there; where all are, the last.
 fn free_name(name: &str, end: &str) -> PathBuf {
-    let numbered = |k: usize| PathBuf::from(format!("{name}-{k:03}{end}"));
-    (1..MOST_FILES).map(numbered).find(|path| !Path::exists(path)).unwrap_or_else(|| numbered(MOST_FILES))
+    let free = numbered(name, end).find(|path| !path.exists());
+    free.or_else(|| numbered(name, end).last()).unwrap_or_default()
 }
 
 impl App<'_> {

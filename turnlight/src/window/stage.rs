@@ -61,7 +61,7 @@ impl Stage {
         }
     }
 
-    /// Seconds since the last frame; a pause counts as a short one.
+    /// Seconds since the last frame; 0 where nothing moved in that one, and a pause counts as a short one.
     fn step(&mut self) -> f64 {
         let now = Instant::now();
         let step = self.last.replace(now).map_or(0.0, |last| (now - last).as_secs_f64());
@@ -69,7 +69,7 @@ impl Stage {
     }
 
     fn count(&mut self, is_new: bool, step: f64) {
-        if !is_new || step >= LONGEST_STEP_S {
+        if !is_new || step == 0.0 || step >= LONGEST_STEP_S {
             self.intervals_s.clear();
             return;
         }
@@ -81,20 +81,24 @@ impl Stage {
 }
 
 impl App<'_> {
-    /// Lays out the picture where there is room left; `push` is what held keys ask of the eye.
-    pub(super) fn stage(&mut self, ui: &mut Ui, push: [f64; 3]) {
+    /// Lays out the picture where there is room left.
+    pub(super) fn stage(&mut self, ui: &mut Ui) {
         let scale = ui.ctx().pixels_per_point();
         let area = pixels_of(ui.max_rect(), scale);
         let size = [area.width(), area.height()].map(|side| side.max(1.0) as usize);
-        self.stage.size = size;
+        if std::mem::replace(&mut self.stage.size, size) != size {
+            // Panels, which come first, knew another eye.
+            ui.ctx().request_repaint();
+        }
         let rect = Rect::from_min_max((area.min.to_vec2() / scale).to_pos2(), (area.max.to_vec2() / scale).to_pos2());
         let response = ui.allocate_rect(rect, Sense::click_and_drag());
         let step = self.stage.step();
         self.divide(ui, &response, rect);
-        let is_moving = self.steer(ui, &response, (step, push), scale) || self.stage.is_dividing;
+        let is_moving = self.steer(ui, &response, step, scale) || self.stage.is_dividing;
         // A slider that is held, too.
         let is_changing = is_moving || ui.ctx().egui_is_using_pointer();
         let coarseness = if is_changing { self.stage.coarseness() } else { 1 };
+        self.stage.last = self.stage.last.filter(|_| is_changing);
         let frame = self.viewer.frame_if_changed(size.map(|side| side.div_ceil(coarseness)));
         self.stage.count(frame.is_some(), step);
         if let Some(frame) = frame {
@@ -135,8 +139,8 @@ impl App<'_> {
     }
 
     /// Moves the eye; whether it is in motion.
-    fn steer(&mut self, ui: &Ui, response: &Response, (step, push): (f64, [f64; 3]), scale: f32) -> bool {
-        let size = self.stage.size;
+    fn steer(&mut self, ui: &Ui, response: &Response, step: f64, scale: f32) -> bool {
+        let (size, push) = (self.stage.size, self.push(ui.ctx()));
         let moved = response.drag_delta() * scale;
         let moved = [moved.x, moved.y].map(f64::from);
         let is_shifted = ui.input(|i| i.modifiers.shift);
@@ -170,6 +174,8 @@ impl App<'_> {
         let events = ui.input(|i| i.raw.events.clone());
         for event in events {
             match event {
+                // Sideways, which is nothing here.
+                Event::MouseWheel { delta, .. } if delta.y == 0.0 => {}
                 Event::MouseWheel { unit: MouseWheelUnit::Point, delta, .. } => {
                     self.viewer.steer().pinch((f64::from(delta.y) * 0.004).exp());
                 }
