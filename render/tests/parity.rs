@@ -195,3 +195,46 @@ fn materials_are_lit_alike() {
         }
     }
 }
+
+/// One column in four is white: what a texel in the middle of a cell says is wrong everywhere.
+struct Stripes(Frame);
+
+impl Sampler for Stripes {
+    fn frame(&self) -> &Frame {
+        &self.0
+    }
+
+    fn value(&self, texel: usize, _: &Vector3<f32>, _: &Vector3<f32>) -> [f32; 3] {
+        [if (texel % self.0.width).is_multiple_of(4) { 1.0 } else { 0.0 }; 3]
+    }
+}
+
+#[test]
+fn fine_stripes_from_afar_are_grey_and_still() {
+    let directions = Arc::new(DirectionSet::new(&bonn_directions()));
+    let stripes = Stripes(Frame { width: 32, height: 32, views: directions.clone(), lights: directions });
+    let (mesh, atlas) = (sphere(40, 20), atlas(64, 64));
+    let charts: Vec<u32> = (0..2000).collect();
+    // Eighteen to a hundred texels under a pixel.
+    let (encoding, exposure, tile_size) = (Encoding::Srgb, 1.0, 0.01);
+    let coat = Coat { charts: &charts, tile_size, sampler: &stripes, encoding, exposure, includes_cosine: true };
+    let coats = Coats::new(&mesh, &[coat]);
+    let light = Light::Directional { toward: Vector3::new(3.0, 0.4, 1.0), irradiance: [1.0; 3] };
+    let lighting = Lighting { lights: vec![light], stops: 0.0 };
+    let lit = Lit { coats: &coats, lighting: &lighting };
+    let seen = |render: &dyn Fn(&Camera) -> Image<[u8; 4]>, shift: f64| {
+        render(&look_at(Point3::new(3.0, 0.4, 1.0 + shift), Point3::origin(), 180.0, 101, 76))
+    };
+    let fast = |camera: &Camera| cpu::render_lit(&mesh, &atlas, &lit, camera, &at(1));
+    let arbiter = |camera: &Camera| reference::render_lit(&mesh, &atlas, &lit, camera, &at(1));
+    for render in [&fast as &dyn Fn(&Camera) -> _, &arbiter] {
+        let (here, there) = (seen(render, 0.0), seen(render, 0.003));
+        // A quarter of white, encoded.
+        let middle = here.at(50, 38);
+        assert_eq!([middle[0], middle[3]], [137, 255], "{middle:?}");
+        let inside = |a: &[u8; 4], b: &[u8; 4]| a[3] == 255 && b[3] == 255;
+        let pairs: Vec<_> = here.pixels().iter().zip(there.pixels()).filter(|(a, b)| inside(a, b)).collect();
+        let change = pairs.iter().map(|(a, b)| a[0].abs_diff(b[0])).max().unwrap();
+        assert!(pairs.len() > 2000 && change <= 2, "{} pixels change by up to {change}", pairs.len());
+    }
+}

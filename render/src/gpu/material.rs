@@ -2,7 +2,8 @@
 //!
 //! Gaussian mixtures and multi-level vector quantisation are evaluated as they are, out of the tables of
 //! [`texture::btf::Tables`]; other codecs are refused. A sub-sample costs up to 16 texels × lights evaluations: of
-//! M components the one, of 16 chains of look-ups the other.
+//! M components the one, of 16 chains of look-ups the other. Footprints of many texels are those 16 spread over it, not
+//! averages as on the CPU.
 
 use super::GpuError;
 use super::device::Device;

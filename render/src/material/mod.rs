@@ -16,11 +16,13 @@
 //!   is in the samples it goes on falling: they are scaled by `l_z / z`, so that nothing breaks off where the
 //!   light sets.
 //! - `texels, w`: [`texture::tile`]; one repetition measures [`Coat::tile_size`] world units, whatever the chart's density.
+//!   Beyond three texels a footprint looks up averages over ever larger cells in their place (`averages.rs`).
 //! - Both sides of a face carry the material, its outside turned to the eye.
 //!
 //! State: surfaces neither shadow nor light each other; photographed charts stay as photographed, for their light
 //! cannot be taken out; distances within the tile are those of the flat atlas, so strongly curved charts stretch it.
 
+mod averages;
 pub mod environment;
 pub mod frame;
 mod light;
@@ -32,6 +34,7 @@ pub use light::{Light, Lighting};
 pub use tile::{SynthesizedTile, Tile};
 
 use crate::face::{Corners, corners};
+use averages::Averages;
 use capture::Image;
 use capture::btf::Encoding;
 use frame::{Frames, TangentFrame};
@@ -80,6 +83,14 @@ pub struct Lit<'a> {
     pub lighting: &'a Lighting,
 }
 
+/// What of a tile lies under a spot.
+struct Taps {
+    /// 0: texels; else cells of this level of the averages.
+    level: usize,
+    /// Texel or cell (row · columns + column), and weight; weights are > 0 and sum to 1.
+    entries: Vec<(usize, f32)>,
+}
+
 /// Where a sub-sample meets the mesh.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Spot {
@@ -98,10 +109,9 @@ struct CoatedFace {
     is_mirrored: bool,
 }
 
-#[derive(Clone, Copy)]
 struct Prepared<'a> {
     coat: Coat<'a>,
-    size: [usize; 2],
+    averages: Averages<'a>,
     /// z of the lowest light measured, above 0.
     lowest_light: f64,
     /// z of the lowest view measured.
@@ -127,7 +137,7 @@ impl<'a> Coat<'a> {
         let prepared = Prepared::new(self);
         let frame = TangentFrame { tangent: Vector3::x(), bitangent: Vector3::y(), normal: Vector3::z() };
         let view = raised(&frame.above(view), prepared.lowest_view).cast();
-        let mut out = Image::filled(prepared.size[0], prepared.size[1], [0.0; 3]);
+        let mut out = Image::filled(self.sampler.frame().width, self.sampler.frame().height, [0.0; 3]);
         for (toward, irradiance) in lights.iter().filter_map(|light| light.at(&Point3::origin())) {
             let toward = frame.local(&toward);
             let Some(share) = prepared.share(&toward) else { continue };
@@ -200,22 +210,25 @@ impl<'a> Prepared<'a> {
         let frame = coat.sampler.frame();
         let lowest = |set: &DirectionSet| set.vectors().iter().map(|d| d.z).fold(1.0, f64::min).max(1e-3);
         let (lowest_light, lowest_view) = (lowest(&frame.lights), lowest(&frame.views));
-        Self { coat: *coat, size: [frame.width, frame.height], lowest_light, lowest_view }
+        Self { coat: *coat, averages: Averages::new(coat.sampler, coat.encoding), lowest_light, lowest_view }
     }
 
-    /// Texels under a spot, and their weights.
-    fn taps(&self, face: &CoatedFace, is_back: bool, spot: &Spot, atlas: [usize; 2]) -> Vec<(usize, f32)> {
+    /// What lies under a spot.
+    fn taps(&self, face: &CoatedFace, is_back: bool, spot: &Spot, atlas: [usize; 2]) -> Taps {
         let [width, height] = atlas.map(|side| side as f64);
         let down = if face.is_mirrored == is_back { face.scale } else { -face.scale };
         let (column, row) = (face.scale * width * spot.uv.x, down * height * spot.uv.y);
         let side = face.scale * (width * height).sqrt() * spot.side;
-        let mut taps = Vec::with_capacity(4);
-        texels_under(column, row, side, self.size, |texel, weight| {
+        let level = self.averages.level(side);
+        let (texels, cells) = (self.averages.size(0), self.averages.size(level));
+        let [across, down] = [0, 1].map(|axis| cells[axis] as f64 / texels[axis] as f64);
+        let mut entries = Vec::with_capacity(4);
+        texels_under(column * across, row * down, side / (1u64 << level) as f64, cells, |texel, weight| {
             if weight > 0.0 {
-                taps.push((texel, weight));
+                entries.push((texel, weight));
             }
         });
-        taps
+        Taps { level, entries }
     }
 
     /// What radiance is multiplied by under a light; `None` below the surface.
@@ -224,15 +237,21 @@ impl<'a> Prepared<'a> {
         (share > 0.0 && self.coat.exposure > 0.0).then_some(share as f32)
     }
 
-    /// The mean over texels, in linear light.
-    fn radiance(&self, taps: &[(usize, f32)], light: &Vector3<f32>, view: &Vector3<f32>) -> [f32; 3] {
+    /// The mean of what lies under a spot, in linear light.
+    fn radiance(&self, taps: &Taps, light: &Vector3<f32>, view: &Vector3<f32>) -> [f32; 3] {
         let mut sum = [0.0; 3];
-        let (mut texels, mut samples) = ([0; TOGETHER], [[0.0; 3]; TOGETHER]);
-        for taps in taps.chunks(TOGETHER) {
-            texels.iter_mut().zip(taps).for_each(|(to, tap)| *to = tap.0);
-            self.coat.sampler.values(&texels[..taps.len()], light, view, &mut samples);
-            for (sample, (_, weight)) in samples.iter().zip(taps) {
-                (0..3).for_each(|c| sum[c] += weight * self.coat.encoding.decode(sample[c]));
+        let mut add = |sample: &[f32; 3], weight: f32| {
+            (0..3).for_each(|c| sum[c] += weight * self.coat.encoding.decode(sample[c]));
+        };
+        if taps.level > 0 {
+            let samples = self.averages.values(taps.level, taps.entries.iter().map(|entry| entry.0), light, view);
+            samples.zip(&taps.entries).for_each(|(sample, &(_, weight))| add(&sample, weight));
+        } else {
+            let (mut texels, mut samples) = ([0; TOGETHER], [[0.0; 3]; TOGETHER]);
+            for entries in taps.entries.chunks(TOGETHER) {
+                texels.iter_mut().zip(entries).for_each(|(to, entry)| *to = entry.0);
+                self.coat.sampler.values(&texels[..entries.len()], light, view, &mut samples);
+                samples.iter().zip(entries).for_each(|(sample, &(_, weight))| add(sample, weight));
             }
         }
         sum.map(|s| s / self.coat.exposure)

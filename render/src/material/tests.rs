@@ -208,6 +208,83 @@ fn repetitions_join_without_a_seam() {
     assert!(row.iter().any(|v| *v < 0.02) && row.iter().any(|v| *v > 0.98));
 }
 
+/// Radiance of a flat sheet under a light from above, with a footprint of `side` texels of a tile that `sampler` answers
+/// for, at `column` texels from its left.
+fn under_footprint(sampler: &dyn Sampler, side: f64, column: f64) -> [f32; 3] {
+    let mesh = plane(0.0);
+    // As many texels of the tile on the unit square as it has: texture coordinates count tiles.
+    let coats = Coats::new(&mesh, &[coat(sampler, 1.0)]);
+    let width = sampler.frame().width as f64;
+    let light = Light::Directional { toward: Vector3::z(), irradiance: [1.0; 3] };
+    let lighting = Lighting { lights: vec![light], stops: 0.0 };
+    let spot = Spot { face: 0, uv: Point2::new(column / width, 0.37), side: side / width };
+    Lit { coats: &coats, lighting: &lighting }.radiance(&spot, &Point3::new(0.5, 0.5, 50.0)).unwrap()
+}
+
+/// Black and white columns.
+fn stripes(size: [usize; 2], width: usize) -> impl Sampler {
+    let of = move |texel: usize, _: &Vector3<f32>, _: &Vector3<f32>| [((texel % size[0]) / width % 2) as f32; 3];
+    Closed { frame: frame(size[0], size[1]), of }
+}
+
+#[test]
+fn fine_stripes_under_a_large_footprint_are_their_mean() {
+    for (size, sides) in [([32, 32], 3.1..1000.0), ([64, 16], 3.1..1000.0), ([256, 256], 12.1..1000.0)] {
+        let sampler = stripes(size, 1);
+        for k in 0..60 {
+            let side = sides.start * 1.1_f64.powi(k);
+            let found = under_footprint(&sampler, side.min(sides.end), 0.713 * f64::from(k));
+            assert!((found[0] - 0.5).abs() < 1e-5, "{found:?} under {side} of {size:?}");
+        }
+    }
+    // Of sides that cannot be halved, what is left over counts as well.
+    for (size, mean) in [([5, 3], 0.4), ([33, 7], 16.0 / 33.0), ([1, 9], 0.0)] {
+        let found = under_footprint(&stripes(size, 1), 500.0, 3.3);
+        assert!((found[0] - mean).abs() < 1e-5, "{found:?} of {size:?}");
+    }
+}
+
+#[test]
+fn a_footprint_that_grows_or_moves_changes_nothing_at_once() {
+    let sampler = stripes([32, 32], 8);
+    let mut before = under_footprint(&sampler, 0.5, 3.7)[0];
+    for k in 1..500 {
+        let found = under_footprint(&sampler, 0.5 * 1.01_f64.powi(k), 3.7)[0];
+        // Where three stripes become one and a half cells of two, two thirds become a half.
+        assert!((found - before).abs() < 1.01 / 6.0, "from {before} to {found} at {k}");
+        before = found;
+    }
+    for side in [3.2, 6.5, 12.4, 25.0] {
+        let row: Vec<f32> = (0..3200).map(|i| under_footprint(&sampler, side, 0.01 * f64::from(i))[0]).collect();
+        let steepest = row.windows(2).map(|pair| (pair[1] - pair[0]).abs()).fold(0.0, f32::max);
+        // Black leaves on one side, white comes in on the other.
+        assert!(f64::from(steepest) < 1.01 * 0.01 / side, "{steepest} under {side}");
+    }
+}
+
+#[test]
+fn a_small_footprint_asks_texel_by_texel() {
+    /// Says nothing of whole pictures.
+    struct Texels<S>(S);
+    impl<S: Sampler> Sampler for Texels<S> {
+        fn frame(&self) -> &Frame {
+            self.0.frame()
+        }
+        fn value(&self, texel: usize, light: &Vector3<f32>, view: &Vector3<f32>) -> [f32; 3] {
+            self.0.value(texel, light, view)
+        }
+        fn picture(&self, _: &Vector3<f32>, _: &Vector3<f32>) -> Vec<f32> {
+            vec![9.0; 3 * self.0.frame().texels()]
+        }
+    }
+    let (whole, texels) = (stripes([32, 32], 3), Texels(stripes([32, 32], 3)));
+    for k in 0..50 {
+        let (side, column) = (0.06 * f64::from(k), 0.713 * f64::from(k));
+        assert_eq!(under_footprint(&whole, side, column), under_footprint(&texels, side, column), "{side}");
+    }
+    assert!((under_footprint(&texels, 3.1, 0.3)[0] - 9.0).abs() < 1e-4);
+}
+
 #[test]
 fn an_eye_along_the_surface_looks_no_lower_than_was_measured() {
     let heights = Closed {

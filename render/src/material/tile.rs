@@ -59,11 +59,19 @@ impl<'a> SynthesizedTile<'a> {
     }
 
     fn sample(&self, view: usize, light: usize, texel: usize) -> [f32; 3] {
-        let make = || {
+        let make = || -> Vec<u16> {
             let (l, v) = (self.frame.lights.vectors()[light].cast(), self.frame.views.vectors()[view].cast());
             self.picture(&l, &v).into_iter().map(|s| (s.clamp(0.0, 1.0) * STEPS).round() as u16).collect()
         };
-        let picture = self.pictures[view * self.frame.lights.len() + light].get_or_init(make);
+        let kept = &self.pictures[view * self.frame.lights.len() + light];
+        // Made outside of the lock: while the synthesizer waits for its own threads, this one may come here again.
+        let picture = match kept.get() {
+            Some(picture) => picture,
+            None => {
+                let made = make();
+                kept.get_or_init(|| made)
+            }
+        };
         [0, 1, 2].map(|c| picture.get(3 * texel + c).map_or(0.0, |&s| f32::from(s) / STEPS))
     }
 }
