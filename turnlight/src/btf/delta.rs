@@ -184,6 +184,14 @@ mod tests {
     }
 
     #[test]
+    fn areas_under_cubics_are_exact() {
+        let curve = Curve::new(vec![[0.0, 0.0], [1.0, 1.0], [2.0, 4.0]]).unwrap();
+        // By hand, slopes 0, 3/2, 4: a piece of width 1 has the area (y0 + y1)/2 + (m0 − m1)/12.
+        let (mean, _) = curve.over(&line(&[0.0, 2.0], 0.0, 0.0)).unwrap();
+        assert!((mean - 4.0 / 3.0).abs() < 1e-12, "{mean}");
+    }
+
+    #[test]
     fn sizes_apart_have_no_difference() {
         assert!(line(&[0.0, 1.0], 0.0, 1.0).over(&line(&[1.0, 2.0], 0.0, 1.0)).is_none());
         assert!(Curve::new(vec![[1.0, 2.0], [1.0, 3.0]]).is_none(), "one size");

@@ -10,7 +10,8 @@
 use crate::metrics::LUMA;
 
 /// What a unit of Y, Cr, Cb adds to the squared error of RGB, as lengths, `√(3, 0.714² + 1.402², 0.344² + 1.772²)`, chroma
-/// multiplied by [`CHROMA`]. Cross terms are left out, so that an error is a sum over luminance and chroma.
+/// multiplied by [`CHROMA`]: what is called RMSE in levels is that of RGB where colours agree, and more where they do not. Cross
+/// terms are left out, so that an error is a sum over luminance and chroma.
 pub(super) const LENGTHS: [f32; 3] = [1.732_050_8, CHROMA * 1.573_385_3, CHROMA * 1.805_081];
 /// Chroma counts more than its error, for it is the first to go: texels of like shading share items whatever their colours, which
 /// become grey as the mean. At equal bytes, 1.6 errs less than 1 in RGB too (weave 24.2 to 25.0 at 1:500).

@@ -1,8 +1,8 @@
 //! When an item stands for a slice.
 //!
-//! *RMSE*: root of the mean squared error over RGB, in 0..255 levels, below the threshold of the level. The root matters: squared
-//! errors violate the triangle inequality. The thresholds of the squared error fall by a constant from book to book,
-//! so that the low books are the finer ones.
+//! *RMSE*: root of the mean squared error over RGB, in 0..255 levels, what chroma adds counted 1.6-fold (see `color`), below the
+//! threshold of the level. The root matters: squared errors violate the triangle inequality. The thresholds of the squared error
+//! fall by a constant from book to book, so that the low books are the finer ones.
 //!
 //! *SSIM*: one threshold for all levels on the dissimilarity `1 − SSIM` that 98 % of the windows stay below (that is, the 2nd
 //! percentile of SSIM). Windows of 5 × 5 cells run over each slice image (α, β), over luminance, or chroma, or all three; for a single
@@ -26,7 +26,7 @@ const ROUNDING: f64 = 2e-4;
 /// How an item is compared to a slice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Measure {
-    /// Root of the mean squared error.
+    /// Root of the mean squared error over RGB, that of chroma counted 1.6-fold.
     Rmse,
     /// Structural similarity within slices.
     Ssim,
@@ -58,7 +58,7 @@ pub(super) struct Patch<'a> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Acceptance {
     pub(super) measure: Measure,
-    /// RMSE in levels, or `1 − SSIM`: of P4, P3, M, P2, P1.
+    /// RMSE in levels, chroma 1.6-fold, or `1 − SSIM`: of P4, P3, M, P2, P1.
     pub(super) luma: [f64; 5],
     /// Of I2, I1, C, in levels; SSIM replaces the first.
     pub(super) chroma: [f64; 3],

@@ -75,14 +75,15 @@ use options::progressive_order;
 use rayon::prelude::*;
 use refine::{Revised, Sums};
 use resample::{Resampler, Texel};
-use size::Search;
+use size::{Search, note_miss};
 use std::sync::Arc;
 
 /// Texels resampled, or compared, as one matrix.
 const BLOCK: usize = 8;
 /// Texels compared at a time.
 const BATCH: usize = 4 * BLOCK;
-/// Resampled texels are held up to so many numbers (1.5 GB); beyond, they are resampled whenever they are asked for.
+/// Resampled texels of all materials are held up to so many numbers (1.6 GB); beyond, they are resampled whenever they are
+/// asked for.
 const HELD: usize = 400_000_000;
 /// Shares of smaller tiles count as those of so many texels: a handful of texels fills no books.
 const SMALL_TILE: usize = 3200;
@@ -131,24 +132,26 @@ pub fn fit_shared(btfs: &[Btf], options: &Options) -> Result<(MultilevelVq, FitR
     if btfs.iter().any(|b| std::mem::discriminant(&b.encoding) != std::mem::discriminant(&first.encoding)) {
         return Err(degenerate("materials of one book are encoded differently", "encode all alike"));
     }
-    let inputs = btfs.iter().map(|btf| Input::new(btf, options)).collect::<Result<Vec<_>, _>>()?;
+    let numbers = 3 * options.grid.nodes() * options.grid.cells() * btfs.iter().map(Btf::texels).sum::<usize>();
+    let inputs = btfs.iter().map(|btf| Input::new(btf, options, numbers <= HELD)).collect::<Result<Vec<_>, _>>()?;
     let mut report = FitReport::default();
     let refined = match options.aim {
-        Aim::Threshold(threshold) => Some(Grown::new(&inputs, options, threshold).refined(&inputs, options)),
+        Aim::Threshold(threshold) => Grown::new(&inputs, options, threshold).refined(&inputs, options),
         Aim::Ratio(ratio) => {
             let most = btfs.iter().map(Btf::raw_bytes).sum::<u64>() as f64 / ratio;
             let bytes = |grown: &Grown| byte_count(first, &grown.codec(first, &inputs, options)) as f64;
             let from = FIRST_THRESHOLD * (ratio / FIRST_RATIO).powf(FIRST_POWER);
-            Search::new(&inputs, options, &bytes, from).refined([most / (1.0 + RATIO_TOLERANCE), most], &mut report)
+            let range = [most / (1.0 + RATIO_TOLERANCE), most].map(f64::ln);
+            Search::new(&inputs, options, &bytes, from).refined(range, &mut report)
         }
         Aim::Entries(count) => {
             let entries = |grown: &Grown| grown.books.texel_count() as f64;
-            let range = [0.9 * count as f64, count as f64];
-            let found = Search::new(&inputs, options, &entries, FIRST_THRESHOLD).within(range, &mut report);
-            found.map(|(grown, _)| grown.refined(&inputs, options))
+            let range = [0.9 * count as f64, count as f64].map(f64::ln);
+            let (grown, found) = Search::new(&inputs, options, &entries, FIRST_THRESHOLD).within(range, &mut report);
+            note_miss(found, range, &mut report);
+            grown.refined(&inputs, options)
         }
     };
-    let refined = refined.unwrap_or_else(|| Grown::new(&inputs, options, FIRST_THRESHOLD).refined(&inputs, options));
     let codec = refined.codec(first, &inputs, options);
     let sizes: Vec<String> = codec.entries().iter().map(|(book, count)| format!("{book} {count}")).collect();
     report.notes.push(format!("items: {}", sizes.join(", ")));
@@ -159,7 +162,7 @@ pub fn fit_shared(btfs: &[Btf], options: &Options) -> Result<(MultilevelVq, FitR
 struct Input<'a> {
     btf: &'a Btf,
     resampler: Resampler,
-    /// All texels on the grid, where they are few enough to be held.
+    /// All texels on the grid, where those of all materials are few enough to be held.
     held: Vec<Texel>,
     /// Texels in the order in which they are coded.
     order: Vec<usize>,
@@ -168,14 +171,15 @@ struct Input<'a> {
 }
 
 impl<'a> Input<'a> {
-    fn new(btf: &'a Btf, options: &Options) -> Result<Self, TextureError> {
+    /// `hold` where the texels of all materials may be held on the grid.
+    fn new(btf: &'a Btf, options: &Options, hold: bool) -> Result<Self, TextureError> {
         let resampler = Resampler::new(options.grid, options.ridge, &btf.views, &btf.lights)?;
         let halve = |btf: &Btf| (btf.texels() > 1).then(|| halved(btf));
         let smaller = match options.mip_maps {
             true => std::iter::successors(halve(btf), halve).collect(),
             false => Vec::new(),
         };
-        let held = match 3 * btf.texels() * options.grid.nodes() * options.grid.cells() <= HELD {
+        let held = match hold {
             true => resampled(&resampler, btf, &(0..btf.texels()).collect::<Vec<_>>()),
             false => Vec::new(),
         };

@@ -7,7 +7,8 @@ use crate::TextureError;
 use crate::btf::{Budget, Precision};
 use capture::btf::Btf;
 
-/// Thresholds of I2, I1, C are not below these, in levels: the constants of the paper, where they are all there is.
+/// Thresholds of I2, I1, C are not below these, in levels, 1.6 of which are one of chroma (see `color`): the constants of the
+/// paper, where they are all there is.
 const COLOR_THRESHOLDS: [f64; 3] = [0.5, 0.2, 0.1];
 /// Falling by 0.4 from book to book, as in the paper, fills P3 and M with what P4 does not need. Chroma takes few bytes; without
 /// a finer threshold of its own it gives way first.
@@ -52,11 +53,12 @@ pub struct Options {
 /// How large it may be.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Aim {
-    /// The error under which a texel is taken for another: RMSE in 0..255 levels, or `1 − SSIM` in hundredths.
+    /// The error under which a texel is taken for another: RMSE in 0..255 levels, that of chroma counted 1.6-fold, or
+    /// `1 − SSIM` in hundredths.
     Threshold(f64),
     /// Raw over coded bytes, at least this and at most 3 % more where a threshold gives it.
     Ratio(f64),
-    /// Items of P4 at most, and nine tenths of it where a threshold gives it.
+    /// Items of P4 at most, and nine tenths of it where a threshold gives it, before refining leaves some without use.
     Entries(usize),
 }
 

@@ -288,6 +288,25 @@ fn a_ratio_is_met_and_hardly_exceeded() {
 }
 
 #[test]
+fn items_are_as_many_as_asked_for_or_the_miss_is_told() {
+    let noted = |report: &FitReport| report.notes.iter().any(|note| note.contains("came nearest"));
+    let btf = striped(8, &few());
+    let (codec, report) = fit(&btf, &options(&btf, Aim::Entries(8), Precision::Compact)).unwrap();
+    let (_, items) = codec.entries()[6];
+    assert!((1..=8).contains(&items) && !noted(&report), "{items} {report:?}");
+    let flat = flat(4, &few(), [0.5, 0.4, 0.3]);
+    let (codec, report) = fit(&flat, &options(&flat, Aim::Entries(8), Precision::Compact)).unwrap();
+    assert!(codec.entries()[6].1 == 1 && noted(&report), "{report:?}");
+}
+
+#[test]
+fn a_ratio_that_nothing_gives_is_told() {
+    let btf = flat(4, &few(), [0.5, 0.4, 0.3]);
+    let (_, report) = fit(&btf, &options(&btf, Aim::Ratio(1e6), Precision::Compact)).unwrap();
+    assert!(report.notes.iter().any(|note| note.contains("came nearest")), "{report:?}");
+}
+
+#[test]
 fn similar_structure_is_accepted_by_ssim() {
     let btf = striped(4, &few());
     let by = |threshold| {
