@@ -307,7 +307,8 @@ mod tests {
     #[test]
     fn a_wheel_comes_as_near_during_a_drag() {
         let (mut dragged, mut free) = (orbit(), orbit());
-        [&mut dragged, &mut free].map(|orbit| orbit.wheel(2.0));
+        dragged.wheel(2.0);
+        free.wheel(2.0);
         for _ in 0..50 {
             dragged.drag([3.0, 1.0], 480, 0.01);
             free.advance(0.01, [0.0; 3]);

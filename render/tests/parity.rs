@@ -6,8 +6,8 @@ mod difference;
 mod scenes;
 mod support;
 
-use capture::Image;
 use capture::btf::{Encoding, bonn_directions};
+use capture::{Camera, Image};
 use difference::difference;
 use nalgebra::{Point3, Vector3};
 use render::material::{Coat, Coats, Light, Lighting, Lit};
