@@ -352,13 +352,13 @@ fn materials_are_lit_alike() {
     let log = Encoding::Log { floor: 1e-3, peak: 1.0 };
     let mixture = mixture(&weave(Encoding::Srgb, true));
     let vq = vector_quantised(&weave(log, false));
-    // A torus of one chart; a sphere whose cells carry the material in turns. Texels are larger than sub-samples, for
-    // averages are not drawn by the adapter.
+    // A torus of one chart; a sphere whose cells carry the material in turns. Texels are far larger than sub-samples,
+    // at the limb too, for averages are not drawn by the adapter.
     let [smooth, weave] = [(&mixture as &dyn Sampler, Encoding::Srgb, true), (&vq, log, false)];
     let cases = [
-        ("mixture", smooth, torus(60, 24), 2.0, 0.001),
-        ("vq", weave, torus(60, 24), 2.0, 0.001),
-        ("vq in cells", weave, sphere(40, 20), 2.0, 0.002),
+        ("mixture", smooth, torus(60, 24), 8.0, 0.001),
+        ("vq", weave, torus(60, 24), 8.0, 0.001),
+        ("vq in cells", weave, sphere(40, 20), 8.0, 0.002),
     ];
     let charts: Vec<u32> = (0..2000).step_by(2).collect();
     let atlas = atlas(128, 96);
