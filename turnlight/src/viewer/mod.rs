@@ -45,7 +45,7 @@ pub const BACKGROUND: [u8; 3] = [27, 29, 33];
 const LONGEST_DIFFERENCE: usize = 800;
 
 /// Frames whose times are kept.
-const TIMES: usize = 240;
+pub const TIMES: usize = 240;
 
 /// What one side of the picture shows; numbers are those of exhibits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

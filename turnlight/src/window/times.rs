@@ -1,6 +1,7 @@
 //! How long the last frames took.
 
 use super::{App, style};
+use crate::viewer::TIMES;
 use render::window::egui::{Align2, FontId, RichText, Sense, Stroke, Ui, Vec2, pos2};
 
 /// Height of the graph, in points.
@@ -24,7 +25,7 @@ impl App<'_> {
         painter.hline(rect.x_range(), height(SCREEN_MS), Stroke::new(1.0, style::LINE));
         let label = pos2(rect.left() + 5.0, height(SCREEN_MS) - 2.0);
         painter.text(label, Align2::LEFT_BOTTOM, "60 a second", FontId::proportional(10.0), style::FAINT);
-        let across = |k: usize| rect.right() - 3.0 - (times.len() - 1 - k) as f32 * rect.width() / 240.0;
+        let across = |k: usize| rect.right() - 3.0 - (times.len() - 1 - k) as f32 * rect.width() / TIMES as f32;
         let line = times.iter().enumerate().map(|(k, &ms)| pos2(across(k), height(ms))).collect();
         painter.line(line, Stroke::new(1.5, style::ACCENT));
         let rate = 1000.0 / median.max(1e-3);

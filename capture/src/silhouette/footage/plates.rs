@@ -8,6 +8,7 @@ use super::optics::{Cutout, Directions, on_plane};
 use super::palette::Palettes;
 use super::shade::Shade;
 use super::stage::Print;
+use crate::matte::components;
 use crate::{Aabb, Camera, Image};
 use nalgebra::Point3;
 use rayon::prelude::*;
@@ -275,21 +276,15 @@ pub(super) fn put_print(texture: &mut Image<Cluster>, dark: &[Option<f32>], pale
 /// Where a place is covered, what is seen beside it and has not the colours of what is around, in light or shade, is the
 /// object, too: a foot that the hull so far does not reach.
 pub(super) fn cover_feet(seen: &mut Image<Cluster>, palettes: &Palettes) {
-    let (width, height) = (seen.width(), seen.height());
-    let mut open: Vec<usize> = (0..width * height).filter(|&at| seen.pixels()[at].is_covered()).collect();
-    while let Some(at) = open.pop() {
-        let (x, y) = (at % width, at / width);
-        let left = (x > 0).then(|| at - 1);
-        let right = (x + 1 < width).then(|| at + 1);
-        let above = (y > 0).then(|| at - width);
-        let below = (y + 1 < height).then(|| at + width);
-        for next in [left, right, above, below].into_iter().flatten() {
-            let texel = &mut seen.pixels_mut()[next];
-            let is_seen = texel.support > 0 && !texel.is_covered();
-            if is_seen && palettes.log_odds(&texel.colour) > OF_A_FOOT {
-                *texel = Cluster::COVERED;
-                open.push(next);
-            }
+    let may_be_object =
+        |texel: Cluster| texel.is_covered() || texel.support > 0 && palettes.log_odds(&texel.colour) > OF_A_FOOT;
+    let (sizes, labels) = components(&seen.map(may_be_object));
+    let mut is_foot = vec![false; sizes.len() + 1];
+    let labelled = || labels.pixels().iter().map(|&label| label as usize);
+    labelled().zip(seen.pixels()).filter(|(_, texel)| texel.is_covered()).for_each(|(label, _)| is_foot[label] = true);
+    for (label, texel) in labelled().zip(seen.pixels_mut()) {
+        if is_foot[label] {
+            *texel = Cluster::COVERED;
         }
     }
 }
