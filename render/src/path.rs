@@ -146,7 +146,8 @@ fn plane_normal(scatter: &Matrix3<f64>) -> Option<Vector3<f64>> {
 }
 
 /// Unit; z where it says nothing.
-pub(crate) fn usable_axis(axis: Vector3<f64>) -> Vector3<f64> {
+/// The unit axis along `axis`, of any length; z where that is zero or not finite.
+pub fn usable_axis(axis: Vector3<f64>) -> Vector3<f64> {
     axis.try_normalize(0.0).filter(|u| u.iter().all(|x| x.is_finite())).unwrap_or_else(Vector3::z)
 }
 

@@ -3,6 +3,7 @@
 //! Azimuthal and equidistant: the radius is the angle from the axis, 1 at a right angle, 2 at the far side.
 
 use nalgebra::{Point3, Vector3};
+use render::path::usable_axis;
 use std::f64::consts::FRAC_PI_2;
 use texture::directions::DirectionComplex;
 
@@ -31,7 +32,7 @@ pub struct Axes([Vector3<f64>; 3]);
 impl Axes {
     /// About `up`, of any length; none gives z.
     pub fn about(up: &Vector3<f64>) -> Self {
-        let up = up.try_normalize(0.0).filter(|u| u.x.is_finite()).unwrap_or_else(Vector3::z);
+        let up = usable_axis(*up);
         let side = Vector3::ith(up.iamin(), 1.0);
         let right = (side - up * up.dot(&side)).normalize();
         Self([right, up.cross(&right), up])
