@@ -32,6 +32,9 @@ const SUSPICIOUS: f32 = 2.0;
 /// little.
 const OF_A_FOOT: f32 = -1.0;
 
+/// The size of a foot, as a multiple of all that is covered in nearly all frames, at most.
+const LARGEST_FOOT: f64 = 2.5;
+
 /// Of the (encoded) light on the print, what falls on parts of it in the mean of all frames.
 const PRINT_LIGHT: std::ops::RangeInclusive<f32> = 0.5..=1.15;
 
@@ -274,14 +277,19 @@ pub(super) fn put_print(texture: &mut Image<Cluster>, dark: &[Option<f32>], pale
 }
 
 /// Where a place is covered, what is seen beside it and has not the colours of what is around, in light or shade, is the
-/// object, too: a foot that the hull so far does not reach.
+/// object, too: a foot that the hull so far does not reach. White paper around a white object is none, though it looks like
+/// one: it is too large.
 pub(super) fn cover_feet(seen: &mut Image<Cluster>, palettes: &Palettes) {
     let may_be_object =
         |texel: Cluster| texel.is_covered() || texel.support > 0 && palettes.log_odds(&texel.colour) > OF_A_FOOT;
     let (sizes, labels) = components(&seen.map(may_be_object));
+    let covered = seen.pixels().iter().filter(|texel| texel.is_covered()).count();
+    let largest = (LARGEST_FOOT * covered as f64) as usize;
     let mut is_foot = vec![false; sizes.len() + 1];
     let labelled = || labels.pixels().iter().map(|&label| label as usize);
-    labelled().zip(seen.pixels()).filter(|(_, texel)| texel.is_covered()).for_each(|(label, _)| is_foot[label] = true);
+    for (label, _) in labelled().zip(seen.pixels()).filter(|(_, texel)| texel.is_covered()) {
+        is_foot[label] = sizes[label - 1] <= largest;
+    }
     for (label, texel) in labelled().zip(seen.pixels_mut()) {
         if is_foot[label] {
             *texel = Cluster::COVERED;

@@ -485,3 +485,43 @@ fn a_foot_beside_a_covered_place_is_not_taken_for_the_target() {
         assert_eq!(seen.at(x, 1).is_covered(), (6..14).contains(&x), "{x}");
     }
 }
+
+/// A white plate on white paper: what is around it has its colour, and is no foot of it.
+#[test]
+fn paper_of_the_object_s_colour_is_no_foot() {
+    let (white, dark) = ([190.0, 190.0, 195.0], [40.0, 42.0, 40.0]);
+    let samples = |colour: [f32; 3]| std::iter::repeat_n(colour, 8000);
+    let palettes = palette::Palettes {
+        object: palette::Palette::learned(samples(white)),
+        surroundings: palette::Palette::learned(samples(white).chain(samples(dark))),
+    };
+    let mut seen = Image::filled(40, 40, cluster::Cluster { colour: white, spread: 3.0, support: 9 });
+    let is_under = |x: usize, y: usize| (15..25).contains(&x) && (15..25).contains(&y);
+    let places = || (0..40).flat_map(|y| (0..40).map(move |x| (x, y)));
+    places().filter(|(x, y)| is_under(*x, *y)).for_each(|(x, y)| seen.set(x, y, cluster::Cluster::COVERED));
+    plates::cover_feet(&mut seen, &palettes);
+    places().for_each(|(x, y)| assert_eq!(seen.at(x, y).is_covered(), is_under(x, y), "{x} {y}"));
+}
+
+/// Few frames look through a loop of rope, so the hull has it filled. Threads of the cloth's colour make a single pixel
+/// doubtful, not the hole.
+#[test]
+fn a_loop_that_the_hull_fills_stays_open() {
+    let (cloth, rope) = ([30, 60, 160], [190, 170, 130]);
+    let is_hole = |x: usize, y: usize| (30..50).contains(&x) && (30..50).contains(&y);
+    let is_rope = |x: usize, y: usize| (10..70).contains(&x) && (10..70).contains(&y) && !is_hole(x, y);
+    let mut picture = Image::filled(80, 80, cloth);
+    let mut hull = Image::filled(80, 80, 0);
+    for (x, y) in (10..70).flat_map(|y| (10..70).map(move |x| (x, y))) {
+        hull.set(x, y, 255);
+        if is_rope(x, y) {
+            picture.set(x, y, rope);
+        }
+    }
+    let log_odds = picture.map(|p| if p == rope { 6.0 } else { -4.5 });
+    let odds = Odds { log_odds, background: Image::filled(80, 80, Some(cloth.map(f32::from))) };
+    let mask = decision::decided(&light::Toned::new(picture, &[1.0; 3]), &odds, &hull, 0.5, None);
+    for (x, y) in (0..80).flat_map(|y| (0..80).map(move |x| (x, y))) {
+        assert_eq!(mask.at(x, y) == 255, is_rope(x, y), "{x} {y}");
+    }
+}
