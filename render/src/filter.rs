@@ -450,6 +450,7 @@ fn before<E: Eight>(at: &[f32; PLACES], size: usize, levels: &[i32; PLACES]) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::simd::{Lanes, Level, Work};
 
     fn pattern(width: usize, height: usize, seed: f32) -> Image<[f32; 3]> {
         let mut image = Image::filled(width, height, [0.0; 3]);
@@ -524,6 +525,43 @@ mod tests {
             // Half a unit for the texels, for each reduction, and for each of three mixes.
             let bound = 0.5 * (4.0 + level.ceil()) / FIXED_ONE + 1e-4;
             assert!((0..3).all(|c| (p[c] - q[c]).abs() < bound), "{p:?} {q:?} at level {level}");
+        }
+    }
+
+    struct LookUp<'a> {
+        chain: &'a MipChain<'a, i16>,
+        at: [&'a [f32; PLACES]; 3],
+        out: &'a mut [[i16; 4]; PLACES],
+    }
+
+    impl Work for LookUp<'_> {
+        #[inline(always)]
+        fn run<E: Lanes>(self) {
+            *self.out = self.chain.look_up::<E>(self.at, PLACES);
+        }
+    }
+
+    #[test]
+    fn places_side_by_side_are_places_alone_on_every_vector_unit() {
+        let fixed = pattern(37, 22, 0.0).map(|p| p.map(|v| (v * FIXED_ONE).round() as i16));
+        let chain = MipChain::build(&fixed, usize::MAX);
+        for i in 0..300 {
+            let wave = |k: usize, scale: f32| ((i * PLACES + k) as f32 * scale).sin();
+            let xs: [f32; PLACES] = std::array::from_fn(|k| 18.0 + 25.0 * wave(k, 0.7));
+            let ys: [f32; PLACES] = std::array::from_fn(|k| 11.0 + 15.0 * wave(k, 1.3));
+            // All on the finest level, then on levels of their own, NaN and infinity among them.
+            let levels: [f32; PLACES] = std::array::from_fn(|k| {
+                [0.0, 4.0 * wave(k, 2.1), [f32::NAN, f32::INFINITY][k % 2]][(i + k % 3) % 3 * (i % 2)]
+            });
+            for level in Level::available() {
+                let mut out = [[0; 4]; PLACES];
+                level.run(LookUp { chain: &chain, at: [&xs, &ys, &levels], out: &mut out });
+                for k in 0..PLACES {
+                    let alone = chain.sample(xs[k], ys[k], levels[k]);
+                    let here = [0, 1, 2].map(|c| f32::from(out[k][c]) / FIXED_ONE);
+                    assert_eq!(here, alone, "{level:?}: {} {} {}", xs[k], ys[k], levels[k]);
+                }
+            }
         }
     }
 
