@@ -10,7 +10,8 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use tests::hostile::{Hostile, hostile};
 use tests::played::{COMPARED, Played, SHARE, agreement, frame, played};
-use texture::{Method, Model};
+use tests::turnlight;
+use texture::{MaterialLayer, Method, Model};
 use turnlight::export::web::Site;
 use turnlight::playback;
 use turnlight::serve::Server;
@@ -95,6 +96,49 @@ fn the_page_shows_what_the_renderer_draws() {
         let rate = report["frame_ms"].as_f64().map_or(0.0, |ms| 1e3 / ms);
         println!("{name}: {rate:.0} frames/s at {}×{}", cameras[0].intrinsics.width, cameras[0].intrinsics.height);
     }
+}
+
+/// A model with a material on every other chart.
+fn coated(place: &Path, glb: &[u8]) -> Model {
+    for args in [
+        &["btf", "synth", "analytic", "-o", "data", "--size", "4", "--samples", "1", "--quiet"][..],
+        &["btf", "fit", "data", "-o", "m.btfz", "--codec", "pca", "--components", "4", "--quiet"],
+    ] {
+        let run = turnlight(place, args);
+        assert_eq!(run.code, Some(0), "{}", run.stderr);
+    }
+    let mut model = Model::from_glb(glb, Path::new("memory")).expect("a model");
+    let charts = (0..model.number_charts() as u32).step_by(2).collect();
+    let layer = MaterialLayer::new(charts, 0.5, std::fs::read(place.join("m.btfz")).expect("a material"));
+    model.lay(vec![layer.expect("a layer")]).expect("charts");
+    model
+}
+
+#[test]
+fn materials_are_painted_on_and_the_rest_plays() {
+    let Some(chromium) = chromium() else {
+        eprintln!("skipped: chromium or node is not installed (apt-get install chromium nodejs)");
+        return;
+    };
+    let place = tempfile::tempdir().expect("a folder");
+    let model = coated(place.path(), played().model(Method::DynTex));
+    let camera = &played().cameras[COMPARED[0]];
+    let url = serve(model.to_glb().expect("a file"));
+    let case = json!({"url": url, "output": place.path(), "cameras": [frame(camera)]});
+    let report = play(&chromium, place.path(), &[case]).remove(0);
+    assert_eq!((&report["state"]["isPlaying"], &report["message"]), (&json!(true), &Value::Null), "{report}");
+    assert!(report["notice"].as_str().is_some_and(|notice| notice.contains("painted on")), "{report}");
+    let mut player = playback::player(&model);
+    let [live, still] = [model.atlas(&camera.center()), model.still()].map(|atlas| player.render(&atlas, camera));
+    let theirs = read_rgb(&place.path().join("0000.png")).expect("a picture");
+    let is_near = |ours: &[u8; 4], theirs: &[u8; 3]| (0..3).all(|c| ours[c].abs_diff(theirs[c]) <= 2);
+    let pixels = live.pixels().iter().zip(still.pixels()).zip(theirs.pixels()).filter(|((live, _), _)| live[3] == 255);
+    let near: Vec<[bool; 2]> = pixels.map(|((l, s), theirs)| [is_near(l, theirs), is_near(s, theirs)]).collect();
+    let share = |of: fn(&[bool; 2]) -> bool| near.iter().filter(|near| of(near)).count() as f64 / near.len() as f64;
+    let (live, still, neither) =
+        (share(|n| *n == [true, false]), share(|n| *n == [false, true]), share(|n| *n == [false; 2]));
+    // Where charts meet, levels of the two textures do not.
+    assert!(live > 0.05 && still > 0.05 && neither < 0.03, "{live} play, {still} are painted, {neither} are neither");
 }
 
 #[test]

@@ -208,6 +208,13 @@ impl Samples {
         first..last.clamp(first, range.end)
     }
 
+    /// Whether all sub-samples are known to lie beside a box of ideal pixels, as they do beside most of small faces.
+    #[inline(always)]
+    pub(super) fn are_beside(&self, low: [f64; 2], high: [f64; 2]) -> bool {
+        let size = [self.intrinsics.width, self.intrinsics.height];
+        self.is_regular() && (0..2).any(|k| self.reached(low[k], high[k], &(0..self.per_side * size[k])).is_empty())
+    }
+
     /// Sorts faces into tiles, of which a lens needs the bounds.
     pub(super) fn bin(&self, faces: &[EdgeFace], bounds: &[Bounds], bins: &mut Bins) {
         bins.pairs.clear();
@@ -232,7 +239,6 @@ impl Samples {
         let n = self.per_side;
         let columns = self.reached(face.low[0], face.high[0], &(0..n * self.intrinsics.width));
         let rows = self.reached(face.low[1], face.high[1], &(0..n * self.intrinsics.height));
-        // Small faces often fall between the sub-samples.
         if columns.is_empty() || rows.is_empty() {
             return;
         }
