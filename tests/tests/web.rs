@@ -163,7 +163,8 @@ fn materials_are_painted_on_and_the_rest_plays() {
         inside.filter(|&(x, y)| near(x, y).is_some() && !is_seam(x, y)).filter_map(|(x, y)| near(x, y)).collect();
     let share = |of: [bool; 2]| found.iter().filter(|near| **near == of).count() as f64 / found.len() as f64;
     let (live, still, neither) = (share([true, false]), share([false, true]), share([false; 2]));
-    assert!(live > 0.2 && still > 0.2 && neither < 0.01, "{live} play, {still} are painted, {neither} are neither");
+    // What is painted has the browser's own mip levels.
+    assert!(live > 0.2 && still > 0.2 && neither < 0.02, "{live} play, {still} are painted, {neither} are neither");
 }
 
 #[test]
