@@ -15,16 +15,8 @@ use std::borrow::Cow;
 /// graphics hardware quantises levels to the same 1/256.
 const MIN_LEVEL: f32 = 1.0 / 256.0;
 
-/// Texels of level `l` per texel of level 0, along one side; more levels than memory could hold.
-const HALVINGS: [f32; 64] = {
-    let mut scales = [1.0; 64];
-    let mut l = 1;
-    while l < scales.len() {
-        scales[l] = 0.5 * scales[l - 1];
-        l += 1;
-    }
-    scales
-};
+/// More levels than any image has, and few enough for the exponent of a float.
+const MOST_LEVELS: usize = 30;
 
 /// Eight numbers in a register: two texels side by side, and two numbers of the next.
 pub trait Eight: Copy {
@@ -40,7 +32,13 @@ pub trait Eight: Copy {
 
     /// The first texel, and a number more.
     fn first(self) -> [i16; 4];
+
+    /// What is before the decimal point of numbers that 32 bits hold.
+    fn whole(numbers: &[f32; PLACES]) -> [i32; PLACES];
 }
+
+/// Places looked up side by side.
+pub(crate) const PLACES: usize = 8;
 
 impl Eight for [i16; 8] {
     #[inline(always)]
@@ -69,12 +67,27 @@ impl Eight for [i16; 8] {
         let [a, b, c, d, ..] = self;
         [a, b, c, d]
     }
+
+    #[inline(always)]
+    fn whole(numbers: &[f32; PLACES]) -> [i32; PLACES] {
+        let mut whole = [0; PLACES];
+        for k in 0..PLACES {
+            whole[k] = numbers[k] as i32;
+        }
+        whole
+    }
 }
 
 /// A channel of a texel: `f32` in levels of 0..=255, or `i16` in shares of one ([`FIXED_ONE`]).
 pub trait Channel: Copy + Default + Send + Sync + std::fmt::Debug + 'static {
     /// Levels of 0..=255 per unit.
     const LEVELS: f32;
+
+    /// How far a place is on the way from one texel to the next, as [`Channel::mix`] takes it.
+    type Share: Copy + Default + std::fmt::Debug;
+
+    /// Of shares between 0 and 1.
+    fn shares<E: Eight>(shares: &[f32; PLACES]) -> [Self::Share; PLACES];
 
     /// As it is, in its own units.
     fn widened(self) -> f32;
@@ -87,16 +100,16 @@ pub trait Channel: Copy + Default + Send + Sync + std::fmt::Debug + 'static {
 
     /// Two texels of two rows each, mixed: `s` across, `t` down. Of two such, `fine` and `coarse`, at `level` between
     /// them. The fourth number is none.
-    fn mix<E: Eight>(fine: &Taps<'_, Self>, coarse: Option<(&Taps<'_, Self>, f32)>) -> [Self; 4];
+    fn mix<E: Eight>(fine: &Taps<'_, Self>, coarse: Option<(&Taps<'_, Self>, Self::Share)>) -> [Self; 4];
 }
 
 /// What a lookup on one level reads: of two rows two texels side by side and two numbers of the next, and how far the place
 /// is on the way from the first to the second.
 #[derive(Clone, Copy, Debug)]
-pub struct Taps<'a, T> {
+pub struct Taps<'a, T: Channel> {
     rows: [&'a [T; 8]; 2],
-    across: f32,
-    down: f32,
+    across: T::Share,
+    down: T::Share,
 }
 
 /// Binary places of a texel in fixed point, which so reaches from −1024 to 1023.97 levels of 0..=255.
@@ -107,6 +120,13 @@ pub const FIXED_ONE: f32 = (1 << FIXED_PLACES) as f32;
 
 impl Channel for f32 {
     const LEVELS: Self = 1.0;
+
+    type Share = Self;
+
+    #[inline(always)]
+    fn shares<E: Eight>(shares: &[f32; PLACES]) -> [Self; PLACES] {
+        *shares
+    }
 
     #[inline(always)]
     fn widened(self) -> f32 {
@@ -125,7 +145,7 @@ impl Channel for f32 {
     }
 
     #[inline(always)]
-    fn mix<E: Eight>(fine: &Taps<'_, Self>, coarse: Option<(&Taps<'_, Self>, f32)>) -> [Self; 4] {
+    fn mix<E: Eight>(fine: &Taps<'_, Self>, coarse: Option<(&Taps<'_, Self>, Self::Share)>) -> [Self; 4] {
         let bilinear = |taps: &Taps<'_, Self>| {
             // Plain loops: `map` over an array is not always inlined.
             let (mut columns, mut out) = (*taps.rows[0], [0.0; 4]);
@@ -152,6 +172,21 @@ impl Channel for f32 {
 impl Channel for i16 {
     const LEVELS: f32 = 1.0 / FIXED_ONE;
 
+    type Share = Self;
+
+    #[inline(always)]
+    fn shares<E: Eight>(shares: &[f32; PLACES]) -> [Self; PLACES] {
+        let mut fixed = [0.0; PLACES];
+        for k in 0..PLACES {
+            fixed[k] = shares[k] * f32::from(Self::MAX);
+        }
+        let (whole, mut out) = (E::whole(&fixed), [0; PLACES]);
+        for k in 0..PLACES {
+            out[k] = whole[k] as Self;
+        }
+        out
+    }
+
     #[inline(always)]
     fn widened(self) -> f32 {
         f32::from(self)
@@ -159,7 +194,7 @@ impl Channel for i16 {
 
     #[inline(always)]
     fn rounded(self) -> u8 {
-        ((i32::from(self) + (1 << FIXED_PLACES >> 1)) >> FIXED_PLACES).clamp(0, 255) as u8
+        (self.saturating_add(1 << FIXED_PLACES >> 1) >> FIXED_PLACES).clamp(0, 255) as u8
     }
 
     #[inline(always)]
@@ -169,17 +204,15 @@ impl Channel for i16 {
     }
 
     #[inline(always)]
-    fn mix<E: Eight>(fine: &Taps<'_, Self>, coarse: Option<(&Taps<'_, Self>, f32)>) -> [Self; 4] {
-        // Through 32 bits, which saturates where it cannot matter.
-        let share = |t: f32| (t * f32::from(Self::MAX)) as i32 as Self;
+    fn mix<E: Eight>(fine: &Taps<'_, Self>, coarse: Option<(&Taps<'_, Self>, Self::Share)>) -> [Self; 4] {
         let bilinear = |taps: &Taps<'_, Self>| {
             let [above, below] = taps.rows.map(E::load);
-            let columns = above.toward(below, share(taps.down));
-            columns.toward(columns.second(), share(taps.across))
+            let columns = above.toward(below, taps.down);
+            columns.toward(columns.second(), taps.across)
         };
         match coarse {
             None => bilinear(fine).first(),
-            Some((taps, t)) => bilinear(fine).toward(bilinear(taps), share(t)).first(),
+            Some((taps, share)) => bilinear(fine).toward(bilinear(taps), share).first(),
         }
     }
 }
@@ -223,57 +256,51 @@ impl<'a, T: Channel> MipChain<'a, T> {
     /// The texture at (`x`, `y`) in texels of level 0, outer corner of the first texel (0, 0),
     /// filtered trilinearly for a fractional `level`; in levels of 0..=255. Zero of an empty atlas.
     pub fn sample(&self, x: f32, y: f32, level: f32) -> [f32; 3] {
-        let [r, g, b, _] = self.look_up::<[i16; 8]>(x, y, level);
+        let [[r, g, b, _], ..] = self.look_up::<[i16; 8]>([&[x; PLACES], &[y; PLACES], &[level; PLACES]], 1);
         [r, g, b].map(|v| v.widened() * T::LEVELS)
     }
 
-    /// The same in the texels' units. The fourth number is none.
+    /// The same in the texels' units, at the first `count` of places side by side; fourth numbers are none.
+    // Loops are plain ones: `map` over an array is not always inlined.
     #[inline(always)]
-    pub(crate) fn look_up<E: Eight>(&self, x: f32, y: f32, level: f32) -> [T; 4] {
-        let level = level.min(self.reduced.len() as i32 as f32);
-        // Also the way out for NaN.
-        if level.is_nan() || level < MIN_LEVEL {
-            let place = Place::new(self.base, x, y);
-            return match place.taps(self.base) {
-                Some(taps) => T::mix::<E>(&taps, None),
-                None => mix_bordering::<T, E>([self.base; 2], [place; 2], 0.0),
-            };
-        }
-        let fine = level as i32 as usize;
-        let scale = HALVINGS[fine.min(HALVINGS.len() - 1)];
-        let images = [self.level(fine), self.level(fine + 1)];
-        let places =
-            [Place::new(images[0], x * scale, y * scale), Place::new(images[1], x * scale * 0.5, y * scale * 0.5)];
-        let share = level - fine as i32 as f32;
-        match (places[0].taps(images[0]), places[1].taps(images[1])) {
-            (Some(a), Some(b)) => T::mix::<E>(&a, Some((&b, share))),
-            _ => mix_bordering::<T, E>(images, places, share),
-        }
-    }
-}
-
-impl<T: Channel> MipChain<'_, T> {
-    /// [`MipChain::look_up`] of up to N places side by side, as many as `out` holds.
-    #[inline(always)]
-    pub(crate) fn look_up_all<E: Eight, const N: usize>(&self, [xs, ys, levels]: [&[f32; N]; 3], out: &mut [[T; 4]]) {
-        let count = out.len().min(N);
-        if levels[..count].iter().any(|&level| level >= MIN_LEVEL) {
+    pub(crate) fn look_up<E: Eight>(&self, [xs, ys, levels]: [&[f32; PLACES]; 3], count: usize) -> [[T; 4]; PLACES] {
+        let mut out = [[T::default(); 4]; PLACES];
+        if !levels.iter().any(|&level| level >= MIN_LEVEL) {
+            // On the one level that nearby objects show.
+            let places: Places<T> = Places::new::<E>(self.base, [xs, ys], &[0; PLACES]);
             for (k, out) in out.iter_mut().enumerate().take(count) {
-                *out = self.look_up::<E>(xs[k], ys[k], levels[k]);
+                let place = places.at(k);
+                *out = match place.taps(self.base) {
+                    Some(taps) => T::mix::<E>(&taps, None),
+                    None => mix_bordering::<T, E>([self.base; 2], [place; 2], T::Share::default()),
+                };
             }
-            return;
+            return out;
         }
-        // On the one level that nearby objects show, places are found in vectors.
-        let columns: Axis<N> = Axis::new(&xs[..count], self.base.width());
-        let rows: Axis<N> = Axis::new(&ys[..count], self.base.height());
+        let top = self.reduced.len().min(MOST_LEVELS) as i32 as f32;
+        let mut clamped = [0.0; PLACES];
+        for k in 0..PLACES {
+            // A comparison that NaN fails.
+            clamped[k] = if levels[k] >= MIN_LEVEL { levels[k].min(top) } else { 0.0 };
+        }
+        let fine = E::whole(&clamped);
+        let (mut coarse, mut shares) = ([0; PLACES], [0.0; PLACES]);
+        for k in 0..PLACES {
+            coarse[k] = fine[k] + 1;
+            shares[k] = clamped[k] - fine[k] as f32;
+        }
+        let shares = T::shares::<E>(&shares);
+        let near: Places<T> = Places::new::<E>(self.base, [xs, ys], &fine);
+        let far: Places<T> = Places::new::<E>(self.base, [xs, ys], &coarse);
         for (k, out) in out.iter_mut().enumerate().take(count) {
-            let (column, row) = (columns.firsts[k] as usize, rows.firsts[k] as usize);
-            let place = Place { column, row, across: columns.shares[k], down: rows.shares[k] };
-            *out = match place.taps(self.base) {
-                Some(taps) => T::mix::<E>(&taps, None),
-                None => mix_bordering::<T, E>([self.base; 2], [place; 2], 0.0),
+            let images = [self.level(fine[k] as usize), self.level(coarse[k] as usize)];
+            let places = [near.at(k), far.at(k)];
+            *out = match (places[0].taps(images[0]), places[1].taps(images[1])) {
+                (Some(a), Some(b)) => T::mix::<E>(&a, Some((&b, shares[k]))),
+                _ => mix_bordering::<T, E>(images, places, shares[k]),
             };
         }
+        out
     }
 }
 
@@ -295,12 +322,12 @@ pub fn level_of_footprint(footprint_squared: f32) -> f32 {
 /// polynomial of its mantissa, the minimax one for log2 on 1..=2 among those that are exact at both ends.
 #[inline(always)]
 pub(crate) fn quick_level_of_footprint(footprint_squared: f32) -> f32 {
-    let bits = footprint_squared.to_bits();
+    // A comparison that NaN fails, and no branch.
+    let bits = (if footprint_squared > 1.0 { footprint_squared } else { 1.0 }).to_bits();
     let exponent = (bits >> 23) as i32 - 127;
     let m = f32::from_bits((bits & 0x007f_ffff) | 0x3f80_0000) - 1.0;
     let log2 = m * (1.0 + (1.0 - m) * (LOG2[0] + m * (LOG2[1] + m * (LOG2[2] + m * LOG2[3]))));
-    // A comparison that NaN fails.
-    if footprint_squared > 1.0 { 0.5 * (exponent as f32 + log2) } else { 0.0 }
+    0.5 * (exponent as f32 + log2)
 }
 
 /// Half the size, each texel the mean of 2 × 2.
@@ -327,48 +354,44 @@ pub(crate) fn halve_row<T: Channel>(above: &[[T; 3]], below: &[[T; 3]], out: &mu
     }
 }
 
-/// Places on one axis of a level, side by side.
-struct Axis<const N: usize> {
-    firsts: [i32; N],
-    shares: [f32; N],
+/// Places side by side, each on a level of its own.
+struct Places<T: Channel> {
+    columns: [i32; PLACES],
+    rows: [i32; PLACES],
+    across: [T::Share; PLACES],
+    down: [T::Share; PLACES],
 }
 
-impl<const N: usize> Axis<N> {
+impl<T: Channel> Places<T> {
+    /// Places in texels of level 0, which `base` is; borders are repeated.
     #[inline(always)]
-    fn new(at: &[f32], size: usize) -> Self {
-        let mut axis = Self { firsts: [0; N], shares: [0.0; N] };
-        for ((&at, first), share) in at.iter().zip(&mut axis.firsts).zip(&mut axis.shares) {
-            (*first, *share) = before(at, size);
-        }
-        axis
+    fn new<E: Eight>(base: &Image<[T; 3]>, [xs, ys]: [&[f32; PLACES]; 2], levels: &[i32; PLACES]) -> Self {
+        let (columns, across) = before::<E>(xs, base.width(), levels);
+        let (rows, down) = before::<E>(ys, base.height(), levels);
+        Self { columns, rows, across: T::shares::<E>(&across), down: T::shares::<E>(&down) }
+    }
+
+    #[inline(always)]
+    fn at(&self, k: usize) -> Place<T> {
+        let (column, row) = (self.columns[k] as usize, self.rows[k] as usize);
+        Place { column, row, across: self.across[k], down: self.down[k] }
     }
 }
 
 /// A place on one level: the texel whose centre lies before it, and how far it is on the way to the next.
-#[derive(Clone, Copy, Debug)]
-struct Place {
+#[derive(Clone, Copy)]
+struct Place<T: Channel> {
     column: usize,
     row: usize,
-    across: f32,
-    down: f32,
+    across: T::Share,
+    down: T::Share,
 }
 
-impl Place {
-    /// (`x`, `y`) in the level's own texels; borders are repeated.
-    #[inline(always)]
-    fn new<T>(image: &Image<[T; 3]>, x: f32, y: f32) -> Self
-    where
-        T: Channel,
-    {
-        let (column, across) = before(x, image.width());
-        let (row, down) = before(y, image.height());
-        Self { column: column as usize, row: row as usize, across, down }
-    }
-
+impl<T: Channel> Place<T> {
     /// `None` where there are no two texels and two numbers more in both rows: at the end of an image, in one that is one
     /// texel wide, in one without texels.
     #[inline(always)]
-    fn taps<'a, T: Channel>(&self, image: &'a Image<[T; 3]>) -> Option<Taps<'a, T>> {
+    fn taps<'a>(&self, image: &'a Image<[T; 3]>) -> Option<Taps<'a, T>> {
         let (width, texels) = (image.width(), image.pixels().as_flattened());
         let above = 3 * (self.row * width + self.column);
         let below = if image.height() > 1 { above + 3 * width } else { above };
@@ -379,7 +402,7 @@ impl Place {
     }
 
     /// The same texel by texel.
-    fn gathered<T: Channel>(&self, image: &Image<[T; 3]>) -> [[T; 8]; 2] {
+    fn gathered(&self, image: &Image<[T; 3]>) -> [[T; 8]; 2] {
         let row = |y: usize| {
             let mut lanes = [T::default(); 8];
             for (k, x) in [self.column, self.column + 1].into_iter().enumerate() {
@@ -395,7 +418,7 @@ impl Place {
 
 /// A lookup that touches the end of an image.
 #[cold]
-fn mix_bordering<T: Channel, E: Eight>(images: [&Image<[T; 3]>; 2], places: [Place; 2], share: f32) -> [T; 4] {
+fn mix_bordering<T: Channel, E: Eight>(images: [&Image<[T; 3]>; 2], places: [Place<T>; 2], share: T::Share) -> [T; 4] {
     let rows = [places[0].gathered(images[0]), places[1].gathered(images[1])];
     let taps = |k: usize| {
         let [above, below] = &rows[k];
@@ -404,20 +427,30 @@ fn mix_bordering<T: Channel, E: Eight>(images: [&Image<[T; 3]>; 2], places: [Pla
     T::mix::<E>(&taps(0), Some((&taps(1), share)))
 }
 
-/// The texel whose centre lies before `x` and how far `x` is on the way to the next. The last texel is
-/// reached as the next of the one before it.
-#[inline]
-fn before(x: f32, size: usize) -> (i32, f32) {
+/// Of places in texels of level 0, where there are `size`, on levels of their own: the texels whose centres lie before
+/// them, and how far they are on the way to the next. The last texel is reached as the next of the one before it.
+#[inline(always)]
+fn before<E: Eight>(at: &[f32; PLACES], size: usize, levels: &[i32; PLACES]) -> ([i32; PLACES], [f32; PLACES]) {
     // In 32 bits, which no image's side leaves: conversions from and to 64 are slow.
     let last = size as i32 - 1;
-    let x = (x - 0.5).max(0.0).min(last.max(0) as f32);
-    let first = (x as i32).min((last - 1).max(0));
-    (first, x - first as f32)
+    let (mut clamped, mut shares) = ([0.0; PLACES], [0.0; PLACES]);
+    for k in 0..PLACES {
+        // 2^−level, by its exponent.
+        let scale = f32::from_bits(((127 - levels[k]) as u32) << 23);
+        clamped[k] = (at[k] * scale - 0.5).max(0.0).min((last >> levels[k]).max(0) as f32);
+    }
+    let mut firsts = E::whole(&clamped);
+    for k in 0..PLACES {
+        firsts[k] = firsts[k].min(((last >> levels[k]) - 1).max(0));
+        shares[k] = clamped[k] - firsts[k] as f32;
+    }
+    (firsts, shares)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::simd::{Lanes, Level, Work};
 
     fn pattern(width: usize, height: usize, seed: f32) -> Image<[f32; 3]> {
         let mut image = Image::filled(width, height, [0.0; 3]);
@@ -492,6 +525,43 @@ mod tests {
             // Half a unit for the texels, for each reduction, and for each of three mixes.
             let bound = 0.5 * (4.0 + level.ceil()) / FIXED_ONE + 1e-4;
             assert!((0..3).all(|c| (p[c] - q[c]).abs() < bound), "{p:?} {q:?} at level {level}");
+        }
+    }
+
+    struct LookUp<'a> {
+        chain: &'a MipChain<'a, i16>,
+        at: [&'a [f32; PLACES]; 3],
+        out: &'a mut [[i16; 4]; PLACES],
+    }
+
+    impl Work for LookUp<'_> {
+        #[inline(always)]
+        fn run<E: Lanes>(self) {
+            *self.out = self.chain.look_up::<E>(self.at, PLACES);
+        }
+    }
+
+    #[test]
+    fn places_side_by_side_are_places_alone_on_every_vector_unit() {
+        let fixed = pattern(37, 22, 0.0).map(|p| p.map(|v| (v * FIXED_ONE).round() as i16));
+        let chain = MipChain::build(&fixed, usize::MAX);
+        for i in 0..300 {
+            let wave = |k: usize, scale: f32| ((i * PLACES + k) as f32 * scale).sin();
+            let xs: [f32; PLACES] = std::array::from_fn(|k| 18.0 + 25.0 * wave(k, 0.7));
+            let ys: [f32; PLACES] = std::array::from_fn(|k| 11.0 + 15.0 * wave(k, 1.3));
+            // All on the finest level, then on levels of their own, NaN and infinity among them.
+            let levels: [f32; PLACES] = std::array::from_fn(|k| {
+                [0.0, 4.0 * wave(k, 2.1), [f32::NAN, f32::INFINITY][k % 2]][(i + k % 3) % 3 * (i % 2)]
+            });
+            for level in Level::available() {
+                let mut out = [[0; 4]; PLACES];
+                level.run(LookUp { chain: &chain, at: [&xs, &ys, &levels], out: &mut out });
+                for k in 0..PLACES {
+                    let alone = chain.sample(xs[k], ys[k], levels[k]);
+                    let here = [0, 1, 2].map(|c| f32::from(out[k][c]) / FIXED_ONE);
+                    assert_eq!(here, alone, "{level:?}: {} {} {}", xs[k], ys[k], levels[k]);
+                }
+            }
         }
     }
 

@@ -440,7 +440,7 @@ class Player {
     const rate = sorted.length > 5 ? ` · ${Math.round(1000 / sorted[sorted.length >> 1])} frames/s` : '';
     say('method', a.isLive || a.total === 1 ? NAMES[a.method] : `${NAMES[a.method]}, static look`);
     say('figures', `${count} ${layers} · atlas ${a.part.size.join('×')}${rate}`);
-    const shown = a.part.materials > 0 ? 'Its materials are shown as what was photographed there.' : '';
+    const shown = a.part.materials > 0 ? 'Its materials are painted on, as seen and lit from straight above.' : '';
     say('notice', a.notice === null ? shown : `Static look: ${a.notice}.`);
   }
 }

@@ -255,7 +255,8 @@ async function readExtension(reader, index) {
   refuseSharedImages(reader, e);
   const texture = material.pbrMetallicRoughness?.baseColorTexture?.index;
   reader.image(list(reader.json.textures)[texture]?.source, size, 'its preview');
-  const part = { method: e.method, size, texture, mesh: readMesh(reader, index), materials: list(e.materials).length };
+  const mesh = readMesh(reader, index);
+  const part = { method: e.method, size, texture, mesh, materials: list(e.materials).length, coated: coatedFaces(mesh, e) };
   if (e.method === 'lumigraph') return Object.assign(part, readRays(reader, e, size));
   return Object.assign(part, await readLayers(reader, e, size));
 }
@@ -285,6 +286,31 @@ function readMesh(reader, index) {
   if (wild !== undefined) throw new ModelError(`a face names vertex ${wild} of ${vertices}`);
   if (!uvs.every((v) => v >= -1e-6 && v <= 1 + 1e-6)) throw new ModelError('a texture coordinate lies outside the atlas');
   return { positions, uvs, faces };
+}
+
+/** Of each face whether a material lies on its chart: charts are what hangs together by vertices, numbered by first faces. */
+function coatedFaces({ positions, faces }, e) {
+  const coated = new Uint8Array(faces.length / 3);
+  const laid = new Set(list(e.materials).flatMap((material) => list(material?.charts)));
+  if (laid.size === 0) return coated;
+  const parent = Uint32Array.from({ length: positions.length / 3 }, (_, v) => v);
+  const root = (v) => {
+    while (parent[v] !== v) v = parent[v] = parent[parent[v]];
+    return v;
+  };
+  for (let i = 0; i < faces.length; i += 3) {
+    for (const v of [faces[i + 1], faces[i + 2]]) parent[root(v)] = root(faces[i]);
+  }
+  const charts = new Map();
+  for (let f = 0; f < coated.length; f++) {
+    const chart = root(faces[3 * f]);
+    if (!charts.has(chart)) charts.set(chart, charts.size);
+    coated[f] = laid.has(charts.get(chart)) ? 1 : 0;
+  }
+  for (const chart of laid) {
+    if (!isIndex(chart) || chart >= charts.size) throw new ModelError(`a material lies on chart ${chart} of ${charts.size}`);
+  }
+  return coated;
 }
 
 async function readLayers(reader, e, size) {
@@ -1085,14 +1111,18 @@ export class Appearance {
     this.ready = 0;
     this.decoded = [];
     const size = new Vector2(...part.size);
-    this.material = new ShaderMaterial({
-      vertexShader: SURFACE_VERTEX,
-      fragmentShader: SURFACE_FRAGMENT,
-      uniforms: { atlas: { value: preview }, size: { value: size }, padded: { value: size }, encoded: { value: false } },
-      glslVersion: null,
-      side: DoubleSide,
-      toneMapped: false,
-    });
+    const wear = (encoded) =>
+      new ShaderMaterial({
+        vertexShader: SURFACE_VERTEX,
+        fragmentShader: SURFACE_FRAGMENT,
+        uniforms: { atlas: { value: preview }, size: { value: size }, padded: { value: size }, encoded },
+        glslVersion: null,
+        side: DoubleSide,
+        toneMapped: false,
+      });
+    this.material = wear({ value: false });
+    /** The static look, which has materials painted on: charts that carry one keep it. */
+    this.still = part.coated.includes(1) ? wear(this.material.uniforms.encoded) : null;
   }
 
   get method() {
@@ -1124,12 +1154,25 @@ export class Appearance {
   /** Dresses a mesh. */
   attach(mesh) {
     mesh.material.dispose();
-    mesh.material = this.material;
+    mesh.material = this.still === null ? this.material : [this.material, this.still];
+    if (this.still !== null) this.#part(mesh.geometry);
     const eye = new Vector3();
     mesh.onBeforeRender = (renderer, _scene, camera) => {
       eye.setFromMatrixPosition(camera.matrixWorld);
       this.update(renderer, mesh.worldToLocal(eye), camera);
     };
+  }
+
+  /** Tells the faces apart that carry a material. */
+  #part(geometry) {
+    const { faces } = this.part.mesh;
+    const corners = [0, 1].map((coated) => faces.filter((_, i) => this.part.coated[Math.trunc(i / 3)] === coated));
+    geometry.clearGroups();
+    geometry.index.array.set(corners[0]);
+    geometry.index.array.set(corners[1], corners[0].length);
+    geometry.addGroup(0, corners[0].length, 0);
+    geometry.addGroup(corners[0].length, corners[1].length, 1);
+    geometry.index.needsUpdate = true;
   }
 
   /** Makes the atlas for an eye in the coordinates of the mesh, unless it is that already. */
@@ -1204,6 +1247,6 @@ export class Appearance {
   }
 
   dispose() {
-    [this.material, this.preview, this.target, this.blend].forEach((held) => held?.dispose());
+    [this.material, this.still, this.preview, this.target, this.blend].forEach((held) => held?.dispose());
   }
 }

@@ -2,15 +2,19 @@
 //!
 //! Chromium and node play the pages headless (`render/web/test`); where either is missing the test skips, saying so.
 
+use capture::btf::{Btf, Encoding};
 use capture::read_rgb;
+use nalgebra::Vector3;
 use serde_json::{Value, json};
+use std::f32::consts::PI;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use tests::hostile::{Hostile, hostile};
 use tests::played::{COMPARED, Played, SHARE, agreement, frame, played};
-use texture::{Method, Model};
+use texture::btf::{self, Budget, CodecKind, Precision};
+use texture::{MaterialLayer, Method, Model};
 use turnlight::export::web::Site;
 use turnlight::playback;
 use turnlight::serve::Server;
@@ -95,6 +99,72 @@ fn the_page_shows_what_the_renderer_draws() {
         let rate = report["frame_ms"].as_f64().map_or(0.0, |ms| 1e3 / ms);
         println!("{name}: {rate:.0} frames/s at {}×{}", cameras[0].intrinsics.width, cameras[0].intrinsics.height);
     }
+}
+
+/// A model with matt red paint, measured under few directions, on every other chart.
+fn coated(glb: &[u8]) -> Model {
+    let polar = |k: usize| Vector3::new((0.3 * k as f64).sin(), 0.0, (0.3 * k as f64).cos());
+    let directions: Vec<Vector3<f64>> = (0..4).map(polar).collect();
+    let lit = |light: &Vector3<f64>| [0.8, 0.2, 0.1].map(|albedo| albedo * light.z as f32).repeat(4);
+    let btf = Btf {
+        name: "paint".to_owned(),
+        samples: directions.iter().flat_map(|_| directions.iter().flat_map(lit)).collect(),
+        views: directions.clone(),
+        lights: directions,
+        width: 2,
+        height: 2,
+        encoding: Encoding::Linear,
+        exposure: PI,
+        includes_cosine: true,
+        texel_pitch_mm: None,
+        measured: Vec::new(),
+    };
+    let (codec, budget) = (CodecKind::Ptm, Budget::Standard);
+    let options = btf::FitOptions { codec, budget, precision: Precision::Full, seed: 1 };
+    let (bytes, _) = btf::fit(btf.encoded(Encoding::Srgb), &options).expect("a fit").0.to_bytes();
+    let mut model = Model::from_glb(glb, Path::new("memory")).expect("a model");
+    let charts = (0..model.number_charts() as u32).step_by(2).collect();
+    model.lay(vec![MaterialLayer::new(charts, 0.5, bytes).expect("a layer")]).expect("charts");
+    model
+}
+
+#[test]
+fn materials_are_painted_on_and_the_rest_plays() {
+    let Some(chromium) = chromium() else {
+        eprintln!("skipped: chromium or node is not installed (apt-get install chromium nodejs)");
+        return;
+    };
+    let place = tempfile::tempdir().expect("a folder");
+    let model = coated(played().model(Method::DynTex));
+    let camera = &played().cameras[COMPARED[0]];
+    let url = serve(model.to_glb().expect("a file"));
+    let case = json!({"url": url, "output": place.path(), "cameras": [frame(camera)]});
+    let report = play(&chromium, place.path(), &[case]).remove(0);
+    assert_eq!((&report["state"]["isPlaying"], &report["message"]), (&json!(true), &Value::Null), "{report}");
+    assert!(report["notice"].as_str().is_some_and(|notice| notice.contains("painted on")), "{report}");
+    let mut player = playback::player(&model);
+    let [live, still] = [model.atlas(&camera.center()), model.still()].map(|atlas| player.render(&atlas, camera));
+    let theirs = read_rgb(&place.path().join("0000.png")).expect("a picture");
+    let is_near = |ours: &[u8; 4], theirs: &[u8; 3]| (0..3).all(|c| ours[c].abs_diff(theirs[c]) <= 2);
+    // Whether a pixel of the object is as it plays, and as it is painted.
+    let near = |x: usize, y: usize| {
+        let (l, s, theirs) = (live.at(x, y), still.at(x, y), theirs.at(x, y));
+        (l[3] == 255).then(|| [is_near(&l, &theirs), is_near(&s, &theirs)])
+    };
+    // Where the two meet, filters of one texture read what the other does not show; so do they at the outline.
+    let is_seam = |x: usize, y: usize| {
+        let around = || (x - 1..=x + 1).flat_map(|x| (y - 1..=y + 1).map(move |y| near(x, y)));
+        around().any(|p| p.is_none())
+            || (around().any(|p| p == Some([true, false])) && around().any(|p| p == Some([false, true])))
+    };
+    let (width, height) = (live.width(), live.height());
+    let inside = (1..height - 1).flat_map(|y| (1..width - 1).map(move |x| (x, y)));
+    let found: Vec<[bool; 2]> =
+        inside.filter(|&(x, y)| near(x, y).is_some() && !is_seam(x, y)).filter_map(|(x, y)| near(x, y)).collect();
+    let share = |of: [bool; 2]| found.iter().filter(|near| **near == of).count() as f64 / found.len() as f64;
+    let (live, still, neither) = (share([true, false]), share([false, true]), share([false; 2]));
+    // What is painted has the browser's own mip levels.
+    assert!(live > 0.2 && still > 0.2 && neither < 0.02, "{live} play, {still} are painted, {neither} are neither");
 }
 
 #[test]

@@ -2,6 +2,8 @@
 
 use crate::Error;
 use capture::Image;
+#[cfg(feature = "video")]
+use capture::video::{FilmWriter, WriteOptions};
 use std::path::Path;
 
 /// Says whether a film of this name can be written, before any work is done.
@@ -48,22 +50,50 @@ where
 
 #[cfg(feature = "video")]
 fn encode(path: &Path, frames: impl Iterator<Item = Image<[u8; 4]>>, fps: f64) -> Result<(), Error> {
-    use capture::video::{FilmWriter, WriteOptions};
-    let mut film: Option<FilmWriter> = None;
+    let mut film: Option<Film> = None;
     for frame in frames {
-        let opaque = frame.map(|[r, g, b, a]| [r, g, b].map(|c| ((u32::from(c) * u32::from(a) + 127) / 255) as u8));
         let started = match &mut film {
             Some(film) => film,
-            none => {
-                let size = [frame.width(), frame.height()];
-                none.insert(FilmWriter::create(path, size, &WriteOptions { fps, ..WriteOptions::default() })?)
-            }
+            none => none.insert(Film::create(path, [frame.width(), frame.height()], fps)?),
         };
-        started.push(&opaque)?;
+        started.push(&frame)?;
     }
     let empty = || Error::Failed(format!("{}: a film without frames; render at least one", path.display()));
-    film.ok_or_else(empty)?.finish()?;
-    Ok(())
+    film.ok_or_else(empty)?.finish()
+}
+
+/// A film of a kind without alpha that is written frame by frame.
+#[cfg(feature = "video")]
+#[derive(Debug)]
+pub struct Film(FilmWriter);
+
+#[cfg(feature = "video")]
+impl Film {
+    /// Starts one of frames of `size` (width, height); where it may not be, nothing is left.
+    ///
+    /// # Errors
+    /// As [`FilmWriter::create`].
+    pub fn create(path: &Path, size: [usize; 2], fps: f64) -> Result<Self, Error> {
+        Ok(Self(FilmWriter::create(path, size, &WriteOptions { fps, ..WriteOptions::default() })?))
+    }
+
+    /// Appends a frame; what is transparent becomes black.
+    ///
+    /// # Errors
+    /// As [`FilmWriter::push`].
+    pub fn push(&mut self, frame: &Image<[u8; 4]>) -> Result<(), Error> {
+        let opaque = frame.map(|[r, g, b, a]| [r, g, b].map(|c| ((u32::from(c) * u32::from(a) + 127) / 255) as u8));
+        Ok(self.0.push(&opaque)?)
+    }
+
+    /// Makes the film appear at its place.
+    ///
+    /// # Errors
+    /// As [`FilmWriter::finish`].
+    pub fn finish(self) -> Result<(), Error> {
+        self.0.finish()?;
+        Ok(())
+    }
 }
 
 /// Never reached: [`check`] refuses first.

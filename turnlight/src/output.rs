@@ -27,6 +27,19 @@ pub fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Error> {
     write().map_err(|source| cannot_write(path, source))
 }
 
+/// Refuses a place where no file can be written, before any work is done for one.
+///
+/// # Errors
+/// Names the file and what the system said.
+pub fn check_writable(path: &Path) -> Result<(), Error> {
+    let probe = || match fs::metadata(path) {
+        Ok(found) if found.is_dir() => Err(std::io::ErrorKind::IsADirectory.into()),
+        Ok(found) if !found.is_file() => Ok(()),
+        _ => Builder::new().prefix(".turnlight-").tempfile_in(parent(path)).map(drop),
+    };
+    probe().map_err(|source| cannot_write(path, source))
+}
+
 /// A folder under construction. Dropped without [`OutputFolder::finish`], it leaves nothing.
 #[derive(Debug)]
 pub struct OutputFolder {
@@ -210,6 +223,16 @@ mod tests {
         write_file(&place.path().join("x.glb"), b"x").unwrap();
         assert!(write_file(place.path(), b"x").is_err(), "a folder is in the way");
         assert_eq!(fs::read_dir(place.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn a_place_is_known_to_take_no_file_before_there_is_one() {
+        let place = tempfile::tempdir().unwrap();
+        assert!(check_writable(&place.path().join("x.png")).is_ok());
+        let refused = check_writable(&place.path().join("none/x.png")).unwrap_err().to_string();
+        assert!(refused.contains("x.png") && refused.contains("make the folder first"), "{refused}");
+        assert!(check_writable(place.path()).is_err(), "a folder is in the way");
+        assert_eq!(fs::read_dir(place.path()).unwrap().count(), 0);
     }
 
     #[cfg(target_os = "linux")]

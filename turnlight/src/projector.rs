@@ -10,6 +10,8 @@ use render::cpu::ScenePlayer;
 #[cfg(feature = "gpu")]
 use render::gpu;
 use render::material::{Coats, Lighting};
+#[cfg(feature = "gpu")]
+use std::sync::{Arc, OnceLock};
 
 /// Who is to draw.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -23,6 +25,15 @@ pub enum Choice {
     Gpu,
 }
 
+/// Who draws, for any number of scenes: hardware is looked for when it is first needed, and once.
+#[derive(Clone, Debug)]
+pub struct Painter {
+    #[cfg(feature = "gpu")]
+    choice: Choice,
+    #[cfg(feature = "gpu")]
+    device: Arc<OnceLock<Result<gpu::Device, gpu::GpuError>>>,
+}
+
 /// Draws the frames of a scene; whoever draws it, the picture is the same within a level nearly everywhere.
 #[derive(Debug)]
 pub struct Projector<'a> {
@@ -34,62 +45,82 @@ pub struct Projector<'a> {
     /// Objects some of whose weights are held fast, which the CPU alone can do.
     pinned: Vec<usize>,
     #[cfg(feature = "gpu")]
-    hardware: Option<Hardware<'a>>,
+    hardware: Hardware<'a>,
     /// What the CPU is called.
     cpu: String,
     note: Option<String>,
 }
 
-/// Graphics hardware, with a scene on it.
+/// Graphics hardware, and whether a scene is on it.
 #[cfg(feature = "gpu")]
 #[derive(Debug)]
-struct Hardware<'a> {
-    renderer: gpu::Renderer<'a>,
-    options: RenderOptions,
-    name: String,
+enum Hardware<'a> {
+    /// Not before the first frame.
+    Expected(Painter),
+    Ready {
+        renderer: Box<gpu::Renderer<'a>>,
+        name: String,
+    },
+    /// The CPU draws.
+    None,
 }
 
-impl<'a> Projector<'a> {
-    /// A projector of `scene`, with the materials that were laid over its models.
+impl Painter {
+    /// As chosen.
     ///
     /// # Errors
     /// [`Error::Arguments`] where graphics hardware is asked for in a build without.
-    pub fn new(
-        scene: &'a Scene,
-        coats: &'a [Option<Coats<'a>>],
-        options: RenderOptions,
-        choice: Choice,
-    ) -> Result<Self, Error> {
+    pub fn new(choice: Choice) -> Result<Self, Error> {
         if choice == Choice::Gpu && !cfg!(feature = "gpu") {
             return Err(Error::Arguments(
                 "this turnlight was built without graphics hardware; let the CPU draw, or build it with --features gpu"
                     .to_owned(),
             ));
         }
-        let projector = Self {
+        Ok(Self {
+            #[cfg(feature = "gpu")]
+            choice,
+            #[cfg(feature = "gpu")]
+            device: Arc::default(),
+        })
+    }
+
+    #[cfg(feature = "gpu")]
+    fn device(&self) -> Result<gpu::Device, gpu::GpuError> {
+        let device = self.device.get_or_init(gpu::Device::headless).clone()?;
+        if self.choice == Choice::Auto && device.is_software() {
+            let fault = format!("{} is itself a program on the CPU", device.name());
+            return Err(gpu::GpuError::NoAdapter { fault });
+        }
+        Ok(device)
+    }
+}
+
+impl<'a> Projector<'a> {
+    /// A projector of `scene`, with the materials that were laid over its models.
+    #[cfg_attr(not(feature = "gpu"), expect(unused_variables, reason = "without hardware there is one who draws"))]
+    pub fn new(scene: &'a Scene, coats: &'a [Option<Coats<'a>>], options: RenderOptions, painter: &Painter) -> Self {
+        Self {
             scene,
             coats,
             options,
             player: None,
             pinned: Vec::new(),
             #[cfg(feature = "gpu")]
-            hardware: None,
+            hardware: match painter.choice {
+                Choice::Cpu => Hardware::None,
+                Choice::Auto | Choice::Gpu => Hardware::Expected(painter.clone()),
+            },
             cpu: format!("cpu, {} threads", rayon::current_num_threads()),
             note: None,
-        };
-        #[cfg(feature = "gpu")]
-        let projector = match choice {
-            Choice::Cpu => projector,
-            _ => projector.handed_over(Hardware::new(scene, coats, options, choice)),
-        };
-        Ok(projector)
+        }
     }
 
-    /// What draws, in a few words.
+    /// What drew the last frame, in a few words; before the first the CPU.
     pub fn device(&self) -> &str {
         #[cfg(feature = "gpu")]
-        if let Some(hardware) = self.hardware.as_ref().filter(|_| self.pinned.is_empty()) {
-            return &hardware.name;
+        if let (Hardware::Ready { name, .. }, true) = (&self.hardware, self.pinned.is_empty()) {
+            return name;
         }
         &self.cpu
     }
@@ -134,21 +165,17 @@ impl<'a> Projector<'a> {
 }
 
 #[cfg(feature = "gpu")]
-impl<'a> Projector<'a> {
-    fn handed_over(self, found: Result<Hardware<'a>, gpu::GpuError>) -> Self {
-        match found {
-            Ok(hardware) => Self { hardware: Some(hardware), ..self },
-            Err(fault) => Self { note: Some(format!("the CPU draws: {fault}")), ..self },
-        }
-    }
-
+impl Projector<'_> {
     /// `None` where the CPU is to draw; after a fault it draws the rest, too.
     fn frame_of_hardware(&mut self, camera: &Camera, lighting: &Lighting) -> Option<Image<[u8; 4]>> {
-        let hardware = self.hardware.as_mut().filter(|_| self.pinned.is_empty());
-        match hardware?.frame(camera, lighting) {
-            Ok(frame) => Some(frame),
+        if !self.pinned.is_empty() {
+            return None;
+        }
+        let shot = gpu::Shot { camera, lighting: Some(lighting), options: self.options };
+        match self.renderer().and_then(|renderer| renderer.map(|renderer| renderer.render(&shot)).transpose()) {
+            Ok(frame) => frame,
             Err(fault) => {
-                self.hardware = None;
+                self.hardware = Hardware::None;
                 self.note = Some(format!("the CPU draws: {fault}"));
                 None
             }
@@ -157,24 +184,18 @@ impl<'a> Projector<'a> {
 }
 
 #[cfg(feature = "gpu")]
-impl<'a> Hardware<'a> {
-    fn new(
-        scene: &'a Scene,
-        coats: &'a [Option<Coats<'a>>],
-        options: RenderOptions,
-        choice: Choice,
-    ) -> Result<Self, gpu::GpuError> {
-        let device = gpu::Device::headless()?;
-        if choice == Choice::Auto && device.is_software() {
-            let fault = format!("{} is itself a program on the CPU", device.name());
-            return Err(gpu::GpuError::NoAdapter { fault });
+impl<'a> Projector<'a> {
+    /// The hardware's, which gets the scene when it first draws.
+    fn renderer(&mut self) -> Result<Option<&mut gpu::Renderer<'a>>, gpu::GpuError> {
+        if let Hardware::Expected(painter) = &self.hardware {
+            let device = painter.device()?;
+            let objects = playback::objects(self.scene, self.coats);
+            let renderer = Box::new(gpu::Renderer::of_scene(&device, &objects, gpu::Blend::fastest(&device))?);
+            self.hardware = Hardware::Ready { renderer, name: format!("gpu, {}", device.name()) };
         }
-        let objects = playback::objects(scene, coats);
-        let renderer = gpu::Renderer::of_scene(&device, &objects, gpu::Blend::fastest(&device))?;
-        Ok(Self { renderer, options, name: format!("gpu, {}", device.name()) })
-    }
-
-    fn frame(&mut self, camera: &Camera, lighting: &Lighting) -> Result<Image<[u8; 4]>, gpu::GpuError> {
-        self.renderer.render(&gpu::Shot { camera, lighting: Some(lighting), options: self.options })
+        Ok(match &mut self.hardware {
+            Hardware::Ready { renderer, .. } => Some(renderer),
+            Hardware::Expected(_) | Hardware::None => None,
+        })
     }
 }

@@ -13,8 +13,8 @@ use std::process::{Command, ExitCode};
 
 const USAGE: &str = "usage: cargo xtask demo [ARGS] | test [--blender] [ARGS] | lint [ARGS]
   demo   build turnlight and run its demo; ARGS go to `turnlight demo`
-  lint   run clippy over all of it; ARGS go to `cargo clippy`
-  test   run the whole test suite, with --blender in Blender too (374 MB once); ARGS go to `cargo test`";
+  lint   run clippy over all of it, and over the default build; ARGS go to `cargo clippy`
+  test   run the whole test suite, and that of the default build, with --blender in Blender too (374 MB once); ARGS go to `cargo test`";
 
 /// Asks for the tests in Blender.
 const BLENDER: &str = "--blender";
@@ -46,7 +46,8 @@ fn demo(args: &[String]) -> Result<()> {
     run(cargo(&root).args(["run", "--release", "--package", "turnlight", "--", "demo"]).args(args))
 }
 
-/// Runs every test of the workspace, with films where OpenCV is to be had.
+/// Runs every test of the workspace, with films where OpenCV is to be had, then those of the command as it is built by
+/// default.
 fn test(args: &[String]) -> Result<()> {
     packages::ensure(&[packages::COMPILER])?;
     let root = root()?;
@@ -61,15 +62,20 @@ fn test(args: &[String]) -> Result<()> {
         _ => (false, args),
     };
     let tools = tools::prepare(&root, with_blender);
-    run(cargo(&root).args(["test", "--workspace"]).args(features()).args(args).envs(tools))
+    run(cargo(&root).args(["test", "--workspace"]).args(features()).args(args).envs(tools))?;
+    run(cargo(&root).args(["test", "--package", "turnlight"]).args(args))
 }
 
-/// Runs the linter over every target, as the tests build them.
+/// Runs the linter over every target, as the tests build them, then over the command as it is built by default.
 fn lint(args: &[String]) -> Result<()> {
     packages::ensure(&[packages::COMPILER])?;
     let root = root()?;
-    let clippy = ["clippy", "--workspace", "--all-targets"];
-    run(cargo(&root).args(clippy).args(features()).args(args).args(["--", "-D", "warnings"]))
+    let lint = |what: &[&str], features: &[&str]| {
+        let clippy = ["clippy", "--all-targets"];
+        run(cargo(&root).args(clippy).args(what).args(features).args(args).args(["--", "-D", "warnings"]))
+    };
+    lint(&["--workspace"], features())?;
+    lint(&["--package", "turnlight"], &[])
 }
 
 /// What to build besides the default.

@@ -20,8 +20,11 @@ METHODS = ("static", "vdtm", "dyntex", "lumigraph")
 # As the other readers: no atlas has more texels, or a longer side.
 MOST_TEXELS = 2**26
 LONGEST_SIDE = 2**15
-# Decoded layers or rays in memory; a few hundred bytes of PNG can ask for any amount.
+# Memory that a model may take; a few hundred bytes of PNG can ask for any amount.
 MOST_BYTES = 2**32
+# What a texel takes in a layer, in a ray (colour and number of the view), and beside them: while a picture is decoded,
+# blended and handed to Blender.
+LAYER_BYTES, RAY_BYTES, TEXEL_BYTES = 3, 5, 192
 # Weights for an eye: facets times layers.
 MOST_WEIGHTS = 2**26
 
@@ -227,9 +230,10 @@ def _refuse_excess(reader, said, size):
     # What is missing counts nothing here, and is named when it is read.
     if sum(len(reader.view(image.get("bufferView"), "images")) for image in held) > len(reader.body):
         raise ModelError("its layers share images")
-    needed = 3 * len(named) * size[0] * size[1]
+    each = RAY_BYTES * len(rays) + LAYER_BYTES * (len(named) - 2 * len(rays)) + TEXEL_BYTES
+    needed = each * size[0] * size[1]
     if needed > MOST_BYTES:
-        raise ModelError(f"its layers take {needed >> 20} MiB, where {MOST_BYTES >> 20} are allowed")
+        raise ModelError(f"it takes {needed >> 20} MiB, where {MOST_BYTES >> 20} are allowed")
 
 
 def _read_mesh(reader):

@@ -6,8 +6,9 @@ import numpy as np
 class LayerBlend:
     """Layers ready to be blended.
 
-    texels: K arrays of N × 3, 8 bit; facet_of_texel: N numbers of facets. Kept facet by facet, so that one product
-    of matrices answers a facet: Σ_facets texels · rank multiply-adds an eye.
+    texels: K arrays of N × 3, 8 bit, asked for one after the other, since each is kept once; facet_of_texel: N numbers
+    of facets. Kept facet by facet, so that one product of matrices answers a facet: Σ_facets texels · rank
+    multiply-adds an eye.
     """
 
     def __init__(self, texels, layers, facet_of_texel, facets):
@@ -16,7 +17,9 @@ class LayerBlend:
         self.offsets = np.array([layer.offset for layer in layers], np.float32)
         self.order = np.argsort(facet_of_texel, kind="stable")
         self.ends = np.concatenate([[0], np.cumsum(np.bincount(facet_of_texel, minlength=facets.count))])
-        self.texels = np.stack([layer[self.order] for layer in texels])
+        self.texels = np.empty((len(layers), len(self.order), 3), np.uint8)
+        for kept, layer in zip(self.texels, texels):
+            kept[:] = layer[self.order]
 
     def atlas(self, eye):
         """The atlas as seen from `eye`, N × 3, unclamped, in levels of 0..255."""

@@ -8,22 +8,25 @@ from .surface import surface_points
 # Rays blended for one texel.
 BLENDED = 4
 NO_RAY = 65535
-# Texels answered at once, for the memory's sake.
-CHUNK = 1 << 15
+# Rays answered at once, for the memory's sake.
+CHUNK = 1 << 18
 
 
 class RayBlend:
     """Rays ready to be blended; raises ValueError where one names a view that is not there.
 
-    colors: slots of N × 3, 8 bit; views: slots of N; centers: views × 3.
+    slots: of each, colours (N × 3, 8 bit) and views (N, 16 bit), asked for one after the other, since each is kept once,
+    where texels show anything; count: how many there are; centers: views × 3.
     """
 
-    def __init__(self, colors, views, centers, mesh, size):
+    def __init__(self, slots, count, centers, mesh, size):
         self.size = size
         self.centers = centers
         self.shown, self.points = surface_points(mesh, size)
-        self.colors = np.stack([slot[self.shown] for slot in colors], axis=1)
-        self.views = np.stack([slot[self.shown] for slot in views], axis=1).astype(np.int64)
+        self.colors = np.empty((len(self.shown), count, 3), np.uint8)
+        self.views = np.empty((len(self.shown), count), np.uint16)
+        for k, (colors, views) in enumerate(slots):
+            self.colors[:, k], self.views[:, k] = colors[self.shown], views[self.shown]
         wild = self.views[(self.views != NO_RAY) & (self.views >= len(centers))]
         if wild.size:
             raise ValueError(f"a ray names view {wild[0]} of {len(centers)}")
@@ -33,15 +36,16 @@ class RayBlend:
         width, height = self.size
         atlas = np.zeros((height * width, 3), np.float32)
         known = np.zeros(height * width, bool)
-        for start in range(0, len(self.shown), CHUNK):
-            part = slice(start, start + CHUNK)
+        step = max(CHUNK // self.views.shape[1], 1)
+        for start in range(0, len(self.shown), step):
+            part = slice(start, start + step)
             blended, has_rays = self._blend(part, np.asarray(eye, np.float64))
             atlas[self.shown[part]] = blended
             known[self.shown[part]] = has_rays
         return fill(atlas.reshape(height, width, 3), known.reshape(height, width)).reshape(-1, 3)
 
     def _blend(self, part, eye):
-        points, views = self.points[part], self.views[part]
+        points, views = self.points[part], self.views[part].astype(np.int64)
         is_ray = views != NO_RAY
         penalties = np.where(is_ray, self._penalties(points, views * is_ray, eye), np.inf)
         nearest = _least(penalties, BLENDED + 1)

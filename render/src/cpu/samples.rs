@@ -144,19 +144,29 @@ impl Samples {
         }
     }
 
-    /// Ideal pixels of sub-samples side by side from (`column`, `row`) on.
+    /// Where a row of sub-samples lies on a regular grid, in pixels; `None` under a lens.
     #[inline(always)]
-    pub(super) fn positions(&self, column: usize, row: usize, xs: &mut [f64], ys: &mut [f64]) {
-        match &self.lens {
-            None => {
-                ys.fill(sample_position(column, row, self.per_side).y);
-                xs.iter_mut().enumerate().for_each(|(k, x)| *x = sample_position(column + k, row, self.per_side).x);
-            }
-            Some(lens) => {
-                let ideal = &lens.ideal[row * self.intrinsics.width * self.per_side + column..];
-                xs.iter_mut().zip(ys).zip(ideal).for_each(|((x, y), ideal)| [*x, *y] = *ideal);
-            }
+    pub(super) fn line(&self, row: usize) -> Option<f64> {
+        self.is_regular().then(|| sample_position(0, row, self.per_side).y)
+    }
+
+    /// Where the columns from `column` on lie on a regular grid, in pixels.
+    #[inline(always)]
+    pub(super) fn across<const N: usize>(&self, column: usize) -> [f64; N] {
+        let mut xs = [0.0; N];
+        for (k, x) in xs.iter_mut().enumerate() {
+            *x = sample_position(column + k, 0, self.per_side).x;
         }
+        xs
+    }
+
+    /// Ideal pixels x and y of sub-samples side by side from (`column`, `row`) on, under a lens; zero beyond the last.
+    pub(super) fn positions<const N: usize>(&self, column: usize, row: usize) -> [[f64; N]; 2] {
+        let (mut xs, mut ys) = ([0.0; N], [0.0; N]);
+        let ideal =
+            self.lens.iter().flat_map(|lens| &lens.ideal[row * self.intrinsics.width * self.per_side + column..]);
+        xs.iter_mut().zip(&mut ys).zip(ideal).for_each(|((x, y), ideal)| [*x, *y] = *ideal);
+        [xs, ys]
     }
 
     /// Whether sub-samples lie on a regular grid.
@@ -198,6 +208,13 @@ impl Samples {
         first..last.clamp(first, range.end)
     }
 
+    /// Whether all sub-samples are known to lie beside a box of ideal pixels, as they do beside most of small faces.
+    #[inline(always)]
+    pub(super) fn are_beside(&self, low: [f64; 2], high: [f64; 2]) -> bool {
+        let size = [self.intrinsics.width, self.intrinsics.height];
+        self.is_regular() && (0..2).any(|k| self.reached(low[k], high[k], &(0..self.per_side * size[k])).is_empty())
+    }
+
     /// Sorts faces into tiles, of which a lens needs the bounds.
     pub(super) fn bin(&self, faces: &[EdgeFace], bounds: &[Bounds], bins: &mut Bins) {
         bins.pairs.clear();
@@ -222,7 +239,6 @@ impl Samples {
         let n = self.per_side;
         let columns = self.reached(face.low[0], face.high[0], &(0..n * self.intrinsics.width));
         let rows = self.reached(face.low[1], face.high[1], &(0..n * self.intrinsics.height));
-        // Small faces often fall between the sub-samples.
         if columns.is_empty() || rows.is_empty() {
             return;
         }

@@ -5,11 +5,11 @@ use super::samples::{Patch, Samples};
 use super::setup::{EdgeFace, Faces, Linear};
 use super::visibility::{NONE, Nearest};
 use crate::face::corners;
-use crate::filter::level_of_footprint;
+use crate::filter::{PLACES, level_of_footprint};
 use crate::simd::{Lanes, Work};
 
 /// Sub-samples looked up side by side.
-pub(super) const SPAN: usize = 64;
+pub(super) const SPAN: usize = PLACES;
 
 /// Sub-samples of one row that see the same face.
 #[derive(Clone, Copy, Debug)]
@@ -18,7 +18,6 @@ pub(super) struct Run {
     pub(super) row: u32,
     /// First column over the frame.
     pub(super) column: u32,
-    /// At most [`SPAN`].
     pub(super) length: u16,
     /// Which of the tile's surfaces.
     pub(super) surface: u32,
@@ -73,20 +72,15 @@ impl Seen {
         self.made.resize(candidates.len(), NONE);
         for row in patch.rows.clone() {
             let slots = nearest.slots(row);
-            let mut start = 0;
-            while start < slots.len() {
+            stretches(slots, |start, end| {
                 let slot = slots[start];
-                let length = same(&slots[start..], slot);
                 if slot != NONE
                     && let Some(surface) = self.surface(geometry, &patch, slot as usize, candidates[slot as usize])
                 {
-                    for first in (start..start + length).step_by(SPAN) {
-                        let (column, length) = (patch.columns.start + first, (start + length - first).min(SPAN));
-                        self.runs.push(Run { row: row as u32, column: column as u32, length: length as u16, surface });
-                    }
+                    let column = (patch.columns.start + start) as u32;
+                    self.runs.push(Run { row: row as u32, column, length: (end - start) as u16, surface });
                 }
-                start += length;
-            }
+            });
         }
     }
 
@@ -100,13 +94,30 @@ impl Seen {
     }
 }
 
-/// How many of `slots` are `slot`, from the first on, which is.
+/// Visits the stretches of equal `slots`, each with its start and its end.
 #[inline(always)]
-fn same(slots: &[u32], slot: u32) -> usize {
-    // Eight at a time is one comparison.
-    let whole = slots.as_chunks::<8>().0.iter().take_while(|eight| **eight == [slot; 8]).count();
-    8 * whole + slots[8 * whole..].iter().take_while(|&&s| s == slot).count()
+fn stretches(slots: &[u32], mut visit: impl FnMut(usize, usize)) {
+    let mut start = 0;
+    for (first, here) in (0..).step_by(BITS).zip(slots.chunks(BITS)) {
+        // Bit k says that another slot follows on the kth: found many at a time, and gone through without guesses.
+        let mut ends = 0_u32;
+        for (k, (a, b)) in here.iter().zip(&slots[first + 1..]).enumerate() {
+            ends |= u32::from(a != b) << k;
+        }
+        while ends != 0 {
+            let end = first + ends.trailing_zeros() as usize + 1;
+            visit(start, end);
+            start = end;
+            ends &= ends - 1;
+        }
+    }
+    if start < slots.len() {
+        visit(start, slots.len());
+    }
 }
+
+/// Slots whose ends are found together.
+const BITS: usize = u32::BITS as usize;
 
 impl Geometry<'_> {
     /// Also marks what a face needs of its part's texture.
@@ -212,17 +223,19 @@ impl Surface {
 
     /// What the sub-samples at ideal pixels (`xs`, `ys`) look up.
     #[inline(always)]
-    pub(super) fn look_up(&self, xs: &[f64], ys: &[f64], span: &mut Span) {
-        let outs = span.x.iter_mut().zip(&mut span.y).zip(&mut span.footprint);
-        for ((&x, &y), ((u, v), footprint)) in xs.iter().zip(ys).zip(outs) {
+    pub(super) fn look_up(&self, xs: &[f64; SPAN], ys: &[f64; SPAN]) -> Span {
+        let mut span = Span { x: [0.0; SPAN], y: [0.0; SPAN], footprint: [0.0; SPAN] };
+        for k in 0..SPAN {
+            let (x, y) = (xs[k], ys[k]);
             let at = |l: &Linear| l[0] * x + (l[1] * y + l[2]);
             let inverse = 1.0 / at(&self.s);
             let (dx, dy) = (squared(&self.dx, y), squared(&self.dy, x));
             let longest = if dx > dy { dx } else { dy };
             let inverse_squared = inverse * inverse;
-            *footprint = (longest * inverse_squared * inverse_squared * self.spacing_squared) as f32;
-            *u = (self.origin[0] + at(&self.u) * inverse) as f32;
-            *v = (self.origin[1] + at(&self.v) * inverse) as f32;
+            span.footprint[k] = (longest * inverse_squared * inverse_squared * self.spacing_squared) as f32;
+            span.x[k] = (self.origin[0] + at(&self.u) * inverse) as f32;
+            span.y[k] = (self.origin[1] + at(&self.v) * inverse) as f32;
         }
+        span
     }
 }

@@ -48,8 +48,19 @@ const BATCH: usize = 1 << 11;
 #[derive(Debug, Default)]
 pub(super) struct Faces {
     batches: Vec<Batch>,
-    /// Of each part, in the camera's coordinates.
-    vertices: Vec<Vec<Option<Vector3<f64>>>>,
+    /// Of each part.
+    vertices: Vec<Vec<Option<Corner>>>,
+}
+
+/// A vertex as the camera has it: a vertex has six faces.
+#[derive(Clone, Copy, Debug)]
+struct Corner {
+    /// In the camera's coordinates.
+    position: Vector3<f64>,
+    /// Its ideal pixel; of no meaning behind the camera.
+    pixel: [f64; 2],
+    /// 1 / depth; infinite behind the camera.
+    inverse_depth: f64,
 }
 
 #[derive(Debug, Default)]
@@ -64,8 +75,9 @@ impl Faces {
         self.vertices.resize_with(parts.len(), Vec::new);
         for (part, vertices) in parts.iter().zip(&mut self.vertices) {
             let to_camera = ToCamera::new(part, camera);
-            // A vertex has six faces.
-            let place = |v: usize| vertex(part.mesh, v).map(|(position, _)| to_camera.apply(&position));
+            let place = |v: usize| {
+                vertex(part.mesh, v).map(|(position, _)| Corner::new(to_camera.apply(&position), &camera.intrinsics))
+            };
             let count = part.mesh.mesh.positions.len();
             (0..count).into_par_iter().with_min_len(1024).map(place).collect_into_vec(vertices);
         }
@@ -79,7 +91,7 @@ impl Faces {
             let faces = parts[part].mesh.mesh.faces[first..].iter().take(BATCH).zip(first..);
             batch.faces.extend(faces.filter_map(|(corners, face)| {
                 let [a, b, c] = corners.map(|v| vertices[part].get(v as usize).copied().flatten());
-                let edges = edge_face(&[a?, b?, c?], &camera.intrinsics)?;
+                let edges = edge_face(&[a?, b?, c?], &camera.intrinsics, samples)?;
                 Some(EdgeFace { part: part as u32, face: u32::try_from(face).ok()?, ..edges })
             }));
             samples.bin(&batch.faces, &bounds, &mut batch.bins);
@@ -118,21 +130,35 @@ impl ToCamera {
     }
 }
 
-/// Of no part yet; `None` behind the camera, and seen exactly edge-on.
-fn edge_face(corners: &[Vector3<f64>; 3], intrinsics: &Intrinsics) -> Option<EdgeFace> {
-    if corners.iter().all(|c| c.z <= 0.0) {
+impl Corner {
+    fn new(position: Vector3<f64>, intrinsics: &Intrinsics) -> Self {
+        let plane = nalgebra::Vector2::new(position.x / position.z, position.y / position.z);
+        let inverse_depth = if position.z > 0.0 { 1.0 / position.z } else { f64::INFINITY };
+        Self { position, pixel: intrinsics.pixel_from_plane(plane).into(), inverse_depth }
+    }
+
+    fn is_in_front(&self) -> bool {
+        self.position.z > 0.0
+    }
+}
+
+/// Of no part yet; `None` behind the camera, seen exactly edge-on, and between the sub-samples.
+fn edge_face(corners: &[Corner; 3], intrinsics: &Intrinsics, samples: &Samples) -> Option<EdgeFace> {
+    if !corners.iter().any(Corner::is_in_front) {
         return None;
     }
-    let [a, b, c] = corners;
+    let (low, high) = bounds(corners, intrinsics);
+    if samples.are_beside(low, high) {
+        return None;
+    }
+    let [a, b, c] = corners.each_ref().map(|corner| &corner.position);
     let normals = [b.cross(c), c.cross(a), a.cross(b)];
     let det = a.dot(&normals[0]);
     let edges = normals.map(|n| over_pixels(if det < 0.0 { -n } else { n }, intrinsics));
     let inverse_det = 1.0 / det.abs();
     let degenerate = !inverse_det.is_finite() || edges.iter().any(|e| e[0] == 0.0 && e[1] == 0.0 && e[2] <= 0.0);
-    let (low, high) = bounds(corners, intrinsics);
-    let inverse_depths = corners.map(|c| if c.z > 0.0 { 1.0 / c.z } else { f64::INFINITY });
-    let (nearest, farthest) =
-        (inverse_depths.into_iter().fold(0.0, f64::max), inverse_depths.into_iter().fold(f64::INFINITY, f64::min));
+    let [p, q, r] = corners.each_ref().map(|corner| corner.inverse_depth);
+    let (nearest, farthest) = (p.max(q).max(r), p.min(q).min(r));
     // Counter-clockwise from outside: the outward normal points at the eye.
     let is_front = det < 0.0;
     (!degenerate).then_some(EdgeFace { edges, inverse_det, nearest, farthest, is_front, part: 0, face: 0, low, high })
@@ -147,15 +173,15 @@ fn over_pixels(n: Vector3<f64>, i: &Intrinsics) -> Linear {
 
 /// The box of what is in front of the camera, projected. Where a face crosses the camera's plane its picture runs to
 /// infinity, on that side alone: `u / z` takes its extremes over a convex part in front at the corners of that part.
-fn bounds(corners: &[Vector3<f64>; 3], intrinsics: &Intrinsics) -> ([f64; 2], [f64; 2]) {
+fn bounds(corners: &[Corner; 3], intrinsics: &Intrinsics) -> ([f64; 2], [f64; 2]) {
     let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
-    for c in corners.iter().filter(|c| c.z > 0.0) {
-        let pixel = intrinsics.pixel_from_plane(nalgebra::Vector2::new(c.x / c.z, c.y / c.z));
+    for corner in corners.iter().filter(|corner| corner.is_in_front()) {
         for k in 0..2 {
-            low[k] = low[k].min(pixel[k] - BOUNDS_MARGIN);
-            high[k] = high[k].max(pixel[k] + BOUNDS_MARGIN);
+            low[k] = low[k].min(corner.pixel[k] - BOUNDS_MARGIN);
+            high[k] = high[k].max(corner.pixel[k] + BOUNDS_MARGIN);
         }
-        for behind in corners.iter().filter(|behind| behind.z <= 0.0) {
+        let c = &corner.position;
+        for behind in corners.iter().filter(|corner| !corner.is_in_front()).map(|corner| &corner.position) {
             let crossing = c.lerp(behind, c.z / (c.z - behind.z));
             let toward = [intrinsics.fx * crossing.x + intrinsics.skew * crossing.y, intrinsics.fy * crossing.y];
             // So near to the eye itself rounding decides the side: both, then.
@@ -190,7 +216,7 @@ mod tests {
             if corners.iter().all(|c| c.z <= 0.0) {
                 continue;
             }
-            let (low, high) = bounds(&corners, &intrinsics());
+            let (low, high) = bounds(&corners.map(|c| Corner::new(c, &intrinsics())), &intrinsics());
             crossings +=
                 usize::from(corners.iter().any(|c| c.z <= 0.0) && (0..2).any(|i| low[i].max(-high[i]).is_finite()));
             for (s, t) in (0..=40).flat_map(|i| (0..=40 - i).map(move |j| (i as f64 / 40.0, j as f64 / 40.0))) {
@@ -209,11 +235,12 @@ mod tests {
 
     #[test]
     fn a_face_beside_the_eye_is_beside_the_frame() {
-        let corners = [[2.0, 0.0, 1.0], [2.0, 0.3, -1.0], [2.5, -0.3, -1.0]].map(Vector3::from);
+        let corner = |c: [f64; 3]| Corner::new(c.into(), &intrinsics());
+        let corners = [[2.0, 0.0, 1.0], [2.0, 0.3, -1.0], [2.5, -0.3, -1.0]].map(corner);
         let (low, _) = bounds(&corners, &intrinsics());
         assert!(low[0] > 320.0, "{low:?}");
         // One around the eye may be anywhere.
-        let around = [[2.0, 0.0, 1.0], [-2.0, 1.0, -0.1], [-2.0, -1.0, -0.1]].map(Vector3::from);
+        let around = [[2.0, 0.0, 1.0], [-2.0, 1.0, -0.1], [-2.0, -1.0, -0.1]].map(corner);
         assert_eq!(bounds(&around, &intrinsics()).0[0], f64::NEG_INFINITY);
     }
 }

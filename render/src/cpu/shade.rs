@@ -65,7 +65,6 @@ impl<T: Channel> Shading<'_, T> {
         let n = self.samples.per_side();
         let (columns, rows) = self.samples.tile_pixels(tile);
         let mut sums = vec![Accumulator::default(); columns.len()];
-        let mut scratch = Scratch::default();
         for runs in seen.runs.chunk_by(|a, b| a.row as usize / n == b.row as usize / n) {
             let y = runs[0].row as usize / n - rows.start;
             let pixels = &mut band[y * width..][columns.clone()];
@@ -73,16 +72,10 @@ impl<T: Channel> Shading<'_, T> {
             for run in runs {
                 let first = run.column as usize - n * columns.start;
                 let surface = &seen.surfaces[run.surface as usize];
-                let colours = self.look_up::<E>(run, surface, &mut scratch);
                 if n == 1 && !surface.is_coated {
-                    // The mean of one.
-                    for (pixel, &[r, g, b, _]) in pixels[first..].iter_mut().zip(colours) {
-                        *pixel = [r.rounded(), g.rounded(), b.rounded(), 255];
-                    }
-                    continue;
-                }
-                for k in 0..usize::from(run.length) {
-                    sums[(first + k) / n].add(self.colour(surface, &scratch, k));
+                    self.pixels::<E>(run, surface, &mut pixels[first..]);
+                } else {
+                    self.add::<E>(run, surface, first, &mut sums);
                 }
             }
             for (pixel, sum) in pixels.iter_mut().zip(&sums).filter(|(_, sum)| !sum.is_empty()) {
@@ -91,52 +84,69 @@ impl<T: Channel> Shading<'_, T> {
         }
     }
 
-    /// Where the sub-samples of a run look, and the texels there unless the surface carries a material.
+    /// Draws the pixels of a run of which each is one sub-sample.
     #[inline(always)]
-    fn look_up<'s, E: Eight>(&self, run: &Run, surface: &Surface, scratch: &'s mut Scratch<T>) -> &'s [[T; 4]] {
-        let length = usize::from(run.length);
-        let Scratch { xs, ys, span, colours } = scratch;
-        let (xs, ys) = (&mut xs[..length], &mut ys[..length]);
-        self.samples.positions(run.column as usize, run.row as usize, xs, ys);
-        surface.look_up(xs, ys, span);
-        if surface.is_coated {
-            return &[];
-        }
-        let mut levels = [0.0; SPAN];
-        for (level, &footprint) in levels.iter_mut().zip(&span.footprint[..length]) {
-            *level = quick_level_of_footprint(footprint);
-        }
-        let chain = &self.looks[surface.part as usize].chain;
-        chain.look_up_all::<E, SPAN>([&span.x, &span.y, &levels], &mut colours[..length]);
-        &colours[..length]
-    }
-
-    /// What sub-sample `k` of the run looked up shows.
-    #[inline(always)]
-    fn colour(&self, surface: &Surface, scratch: &Scratch<T>, k: usize) -> [f32; 3] {
-        let look = &self.looks[surface.part as usize];
-        match (&look.lit, surface.is_coated) {
-            (Some(lit), true) => look.lit(lit, surface.face, &scratch.span, k),
-            _ => {
-                let [r, g, b, _] = scratch.colours[k];
-                [r, g, b].map(|v| v.widened() * T::LEVELS)
+    fn pixels<E: Eight>(&self, run: &Run, surface: &Surface, pixels: &mut [[u8; 4]]) {
+        let pixels = pixels.chunks_mut(SPAN).take(usize::from(run.length).div_ceil(SPAN)).enumerate();
+        for (k, pixels) in pixels {
+            let count = (usize::from(run.length) - k * SPAN).min(SPAN).min(pixels.len());
+            let colours = self.look_up::<E>(surface, &self.span(run, k * SPAN, surface), count);
+            // The mean of one. A plain loop: `map` over an array is not always inlined.
+            let mut means = [[0; 4]; SPAN];
+            for (mean, colour) in means.as_flattened_mut().iter_mut().zip(colours.as_flattened()) {
+                *mean = colour.rounded();
+            }
+            means.iter_mut().for_each(|mean| mean[3] = 255);
+            match pixels.first_chunk_mut::<SPAN>() {
+                Some(pixels) if count == SPAN => *pixels = means,
+                _ => pixels[..count].copy_from_slice(&means[..count]),
             }
         }
     }
-}
 
-/// Where sub-samples lie and what they look up.
-struct Scratch<T> {
-    xs: [f64; SPAN],
-    ys: [f64; SPAN],
-    span: Span,
-    colours: [[T; 4]; SPAN],
-}
+    /// Adds the sub-samples of a run, from place `first` of the tile's row on, to the `sums` of their pixels.
+    #[inline(always)]
+    fn add<E: Eight>(&self, run: &Run, surface: &Surface, first: usize, sums: &mut [Accumulator]) {
+        let n = self.samples.per_side();
+        let look = &self.looks[surface.part as usize];
+        for start in (0..usize::from(run.length)).step_by(SPAN) {
+            let count = (usize::from(run.length) - start).min(SPAN);
+            let span = self.span(run, start, surface);
+            let mut add = |k: usize, colour: [f32; 3]| sums[(first + start + k) / n].add(colour);
+            match look.lit.as_ref().filter(|_| surface.is_coated) {
+                Some(lit) => (0..count).for_each(|k| add(k, look.lit(lit, surface.face, &span, k))),
+                None => {
+                    let colours = self.look_up::<E>(surface, &span, count);
+                    for (k, [r, g, b, _]) in colours.into_iter().enumerate().take(count) {
+                        add(k, [r, g, b].map(|v| v.widened() * T::LEVELS));
+                    }
+                }
+            }
+        }
+    }
 
-impl<T: Channel> Default for Scratch<T> {
-    fn default() -> Self {
-        let span = Span { x: [0.0; SPAN], y: [0.0; SPAN], footprint: [0.0; SPAN] };
-        Self { xs: [0.0; SPAN], ys: [0.0; SPAN], span, colours: [[T::default(); 4]; SPAN] }
+    /// Where the sub-samples of a run look, from its `start` on.
+    #[inline(always)]
+    fn span(&self, run: &Run, start: usize, surface: &Surface) -> Span {
+        let (column, row) = (run.column as usize + start, run.row as usize);
+        match self.samples.line(row) {
+            Some(y) => surface.look_up(&self.samples.across(column), &[y; SPAN]),
+            None => {
+                let [xs, ys] = self.samples.positions(column, row);
+                surface.look_up(&xs, &ys)
+            }
+        }
+    }
+
+    /// The texels at the first `count` places of a span.
+    #[inline(always)]
+    fn look_up<E: Eight>(&self, surface: &Surface, span: &Span, count: usize) -> [[T; 4]; SPAN] {
+        let mut levels = [0.0; SPAN];
+        for k in 0..SPAN {
+            levels[k] = quick_level_of_footprint(span.footprint[k]);
+        }
+        let chain = &self.looks[surface.part as usize].chain;
+        chain.look_up::<E>([&span.x, &span.y, &levels], count)
     }
 }
 

@@ -11,6 +11,8 @@ use winit::event_loop::ActiveEventLoop;
 use winit::window::Window;
 
 pub(super) struct Screen {
+    instance: wgpu::Instance,
+    window: Arc<Window>,
     surface: wgpu::Surface<'static>,
     config: wgpu::SurfaceConfiguration,
     device: Device,
@@ -43,8 +45,9 @@ impl Screen {
         // A dithered picture would not be the picture.
         let options = RendererOptions { dithering: false, ..RendererOptions::default() };
         let renderer = Renderer::new(device.wgpu(), config.format, options);
-        let mut screen = Self { surface, config, device, renderer, longest };
+        let window = Arc::clone(window);
         let size = window.inner_size();
+        let mut screen = Self { instance, window, surface, config, device, renderer, longest };
         screen.resize([size.width, size.height])?;
         Ok(screen)
     }
@@ -77,7 +80,11 @@ impl Screen {
         let size_in_pixels = [self.config.width, self.config.height];
         let descriptor = ScreenDescriptor { size_in_pixels, pixels_per_point };
         let shown = self.guarded(|screen| screen.draw(primitives, textures, &descriptor))?;
-        if shown == Shown::Outdated {
+        if shown == Shown::Lost {
+            let surface = self.instance.create_surface(Arc::clone(&self.window));
+            self.surface = surface.map_err(|e| WindowError::NoAdapter { fault: e.to_string() })?;
+        }
+        if matches!(shown, Shown::Outdated | Shown::Lost) {
             self.guarded(|screen| screen.surface.configure(screen.device.wgpu(), &screen.config))?;
         }
         Ok(shown == Shown::Whole)
@@ -94,7 +101,8 @@ impl Screen {
         let (frame, shown) = match self.surface.get_current_texture() {
             Current::Success(frame) => (Some(frame), Shown::Whole),
             Current::Suboptimal(frame) => (Some(frame), Shown::Whole),
-            Current::Outdated | Current::Lost => (None, Shown::Outdated),
+            Current::Outdated => (None, Shown::Outdated),
+            Current::Lost => (None, Shown::Lost),
             Current::Timeout | Current::Occluded | Current::Validation => (None, Shown::Hidden),
         };
         if let Some(frame) = &frame {
@@ -142,6 +150,9 @@ impl Screen {
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Shown {
     Whole,
+    /// Of another size than the window now.
     Outdated,
+    /// Gone, as after a driver has been reset: it takes another one.
+    Lost,
     Hidden,
 }

@@ -1,7 +1,7 @@
 // node play.mjs JOB.json: plays models in a headless Chromium and prints what came of it as JSON.
 //
 // JOB: { chromium, cases: [{ url, output, cameras: [frame of a transforms.json], frames, sizes: [[name, w, h, isPhone]] }] }.
-// Of each case come `exceptions`, `errors`, `requests`, `message`; where the model plays also `state`, `size` and
+// Of each case come `exceptions`, `errors`, `requests`, `notice`, `message`; where the model plays also `state`, `size` and
 // `frame_ms`, with pictures in `output`: NNNN.png per camera, NAME.png of the page in each size.
 
 import { readFileSync, writeFileSync } from 'node:fs';
@@ -30,6 +30,7 @@ async function play(page, { url, output, cameras = [], frames = 0, sizes = [] })
     await new Promise((resolve) => setTimeout(resolve, 1500));
     writeFileSync(join(output, `${name}.png`), await page.screenshot());
   }
+  report.notice = await page.evaluate(`document.getElementById('notice').textContent`);
   report.message = (await page.evaluate(refused)) ? await page.evaluate(`document.getElementById('message').textContent`) : null;
   return { ...report, exceptions: page.exceptions, errors: page.errors, requests: page.requests };
 }

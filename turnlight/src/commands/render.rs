@@ -7,7 +7,7 @@ use serde_json::json;
 use std::time::Instant;
 use turnlight::capture::{Aabb, Camera, Capture, Image};
 use turnlight::output::OutputFolder;
-use turnlight::projector::Projector;
+use turnlight::projector::{Painter, Projector};
 use turnlight::render::RenderOptions;
 use turnlight::render::film::write_png;
 use turnlight::render::path::{TURN_FRAMES, smooth_cameras, turntable_cameras, up_axis};
@@ -131,7 +131,7 @@ fn draw(
     let tiles: Vec<_> = scene.models.iter().map(playback::tiles).collect();
     let coats: Vec<_> = scene.models.iter().zip(&tiles).map(|(model, tiles)| playback::coats(model, tiles)).collect();
     let options = RenderOptions { supersample: args.supersample, background: args.background };
-    let mut projector = Projector::new(scene, &coats, options, choice(args.renderer))?;
+    let mut projector = Projector::new(scene, &coats, options, &Painter::new(choice(args.renderer))?);
     let lamps = args.light.lamps(scene.aabb().map_or([0.0; 3], |aabb| aabb.center().into()))?;
     let mut frame = |i: usize, camera: &Camera| {
         let start = Instant::now();

@@ -4,6 +4,7 @@ use super::false_colour::{facets, most_layers, of_facet, of_rank, painted, ranks
 use crate::Error;
 use crate::scene::Scene;
 use std::path::Path;
+use std::sync::OnceLock;
 
 /// A scene and what it is called; where several are shown they are the same object by other methods.
 #[derive(Clone, Debug)]
@@ -12,28 +13,33 @@ pub struct Exhibit {
     pub name: String,
     /// What is shown.
     pub scene: Scene,
-    /// The same with every facet in a colour of its own.
-    pub facets: Scene,
-    /// The same in the colours of how many layers a facet has.
-    pub ranks: Scene,
-    /// The most that any has; of lumigraphs, rays.
-    pub most_layers: usize,
+    facets: OnceLock<Scene>,
+    ranks: OnceLock<Scene>,
+    most_layers: OnceLock<usize>,
 }
 
 impl Exhibit {
     /// A scene by this name.
     pub fn new(name: String, scene: Scene) -> Self {
-        let most_layers = most_layers(&scene);
+        Self { name, scene, facets: OnceLock::new(), ranks: OnceLock::new(), most_layers: OnceLock::new() }
+    }
+
+    /// The same with every facet in a colour of its own; painted when it is first asked for.
+    pub fn facets(&self) -> &Scene {
+        self.facets.get_or_init(|| painted(&self.scene, facets, |facet| of_facet(usize::from(facet))))
+    }
+
+    /// The same in the colours of how many layers a facet has, likewise.
+    pub fn ranks(&self) -> &Scene {
         // From one to the most.
-        let most = most_layers.saturating_sub(1).max(1) as f64;
+        let most = self.most_layers().saturating_sub(1).max(1) as f64;
         let share = |rank: u16| f64::from(rank.saturating_sub(1)) / most;
-        Self {
-            name,
-            facets: painted(&scene, facets, |facet| of_facet(usize::from(facet))),
-            ranks: painted(&scene, ranks, |rank| of_rank(share(rank))),
-            most_layers,
-            scene,
-        }
+        self.ranks.get_or_init(|| painted(&self.scene, ranks, |rank| of_rank(share(rank))))
+    }
+
+    /// The most layers that any facet has; of lumigraphs, rays.
+    pub fn most_layers(&self) -> usize {
+        *self.most_layers.get_or_init(|| most_layers(&self.scene))
     }
 
     /// Reads models or scenes (`.json`) and names them: by their method where that tells them apart, by their files

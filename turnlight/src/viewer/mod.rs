@@ -21,7 +21,7 @@ pub mod split;
 pub use exhibit::Exhibit;
 pub use panel::Panel;
 
-use crate::projector::{Choice, Projector};
+use crate::projector::{Choice, Painter, Projector};
 use crate::{Error, playback};
 use capture::{Aabb, Camera, Capture, Image, reduced};
 use difference::{Difference, difference};
@@ -164,7 +164,7 @@ impl<'a> Viewer<'a> {
     /// A viewer of `exhibits`, which must not be empty; `coats` are those of the models of each.
     ///
     /// # Errors
-    /// Where there is no exhibit; as [`Projector::new`].
+    /// Where there is no exhibit; as [`Painter::new`].
     pub fn new(
         exhibits: &'a [Exhibit],
         coats: &'a [Vec<Option<Coats<'a>>>],
@@ -175,10 +175,11 @@ impl<'a> Viewer<'a> {
         let aabb = first.scene.aabb().unwrap_or(unit);
         let filmed: Vec<Camera> = options.capture.iter().flat_map(|c| &c.frames).map(|frame| frame.camera).collect();
         let up = options.up.or_else(|| up_axis(&filmed)).unwrap_or_else(Vector3::z);
-        let drawn = exhibits.iter().zip(coats).map(|(exhibit, coats)| Drawn::new(exhibit, coats, options.renderer));
+        let painter = Painter::new(options.renderer)?;
+        let drawn = exhibits.iter().zip(coats).map(|(exhibit, coats)| Drawn::new(exhibit, coats, &painter));
         let mut viewer = Self {
             exhibits,
-            drawn: drawn.collect::<Result<_, _>>()?,
+            drawn: drawn.collect(),
             orbit: Orbit::new(&aabb, filmed.first(), up),
             centre: aabb.center(),
             photographs: options.capture.map(Photographs::new).filter(|photographs| !photographs.is_empty()),
@@ -482,20 +483,20 @@ impl<'a> Viewer<'a> {
 }
 
 impl<'a> Drawn<'a> {
-    fn new(exhibit: &'a Exhibit, coats: &'a [Option<Coats<'a>>], renderer: Choice) -> Result<Self, Error> {
+    fn new(exhibit: &'a Exhibit, coats: &'a [Option<Coats<'a>>], painter: &Painter) -> Self {
         let background = exhibit.scene.backdrop.is_none().then_some(BACKGROUND);
         let options = RenderOptions { background, ..RenderOptions::default() };
-        let projector = Projector::new(&exhibit.scene, coats, options, renderer)?;
+        let projector = Projector::new(&exhibit.scene, coats, options, painter);
         let (facets, ranks, compared) = (None, None, None);
-        Ok(Self { exhibit, coats, projector, why_cpu: None, facets, ranks, compared, picked: None, pins: Vec::new() })
+        Self { exhibit, coats, projector, why_cpu: None, facets, ranks, compared, picked: None, pins: Vec::new() }
     }
 
     fn facets(&mut self) -> &mut ScenePlayer<'a> {
-        self.facets.get_or_insert_with(|| in_false_colour(&self.exhibit.facets))
+        self.facets.get_or_insert_with(|| in_false_colour(self.exhibit.facets()))
     }
 
     fn ranks(&mut self) -> &mut ScenePlayer<'a> {
-        self.ranks.get_or_insert_with(|| in_false_colour(&self.exhibit.ranks))
+        self.ranks.get_or_insert_with(|| in_false_colour(self.exhibit.ranks()))
     }
 
     fn compared(&mut self) -> &mut ScenePlayer<'a> {

@@ -22,7 +22,7 @@ impl App<'_> {
         if let Some(exhibit) = self.viewer.exhibits().get(current) {
             let are_rays = exhibit.scene.models.iter().all(|model| basis::layers(model).is_none());
             let unit = if are_rays { "rays" } else { "layers" };
-            ramp(ui, false_colour::of_rank, ["1".to_owned(), format!("{} {unit}", exhibit.most_layers)]);
+            ramp(ui, false_colour::of_rank, ["1".to_owned(), format!("{} {unit}", exhibit.most_layers())]);
         }
     }
 }

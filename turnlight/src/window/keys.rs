@@ -28,7 +28,7 @@ const TABLE: [(&str, &str); 15] = [
     ("F, R", "facets, ranks"),
     ("N", "go to the photograph"),
     ("E", "difference from it"),
-    ("S, T", "picture, turn as pictures"),
+    ("S, T", "picture, turn around"),
     ("P", "panels"),
     ("Esc", "close"),
 ];

@@ -53,17 +53,7 @@ const SEPARATION: f32 = 2.0;
 /// Where no window can be opened; where the picture that [`WindowOptions::screenshot`] asks for cannot be written.
 pub fn show(viewer: Viewer<'_>, options: &WindowOptions) -> Result<(), Error> {
     let title = format!("{} · Turnlight", options.name);
-    let mut app = App {
-        viewer,
-        panels: options.panels.clone(),
-        has_panels: options.has_panels,
-        adapter: String::new(),
-        stage: Stage::default(),
-        thumbnails: Thumbnails::default(),
-        recorder: Recorder::new(options.name.clone(), options.screenshot.clone()),
-        is_spinning: false,
-        message: String::new(),
-    };
+    let mut app = App::new(viewer, options);
     open(&render::window::WindowOptions { title, size: options.size }, &mut app)?;
     app.recorder.finish()
 }
@@ -114,6 +104,22 @@ impl Show for App<'_> {
     }
 }
 
+impl<'a> App<'a> {
+    fn new(viewer: Viewer<'a>, options: &WindowOptions) -> Self {
+        Self {
+            viewer,
+            panels: options.panels.clone(),
+            has_panels: options.has_panels,
+            adapter: String::new(),
+            stage: Stage::default(),
+            thumbnails: Thumbnails::default(),
+            recorder: Recorder::new(options.name.clone(), options.screenshot.clone()),
+            is_spinning: false,
+            message: String::new(),
+        }
+    }
+}
+
 impl App<'_> {
     fn panels(&mut self, ui: &mut Ui) {
         self.look(ui);
@@ -158,5 +164,60 @@ impl App<'_> {
         if self.panels.len() == before {
             self.panels.push(panel);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bench::object::bumpy_ball;
+    use crate::projector::Choice;
+    use crate::scene::Scene;
+    use crate::viewer::{Exhibit, ViewerOptions};
+    use render::window::egui::{FullOutput, Pos2, RawInput, Rect, Shape, Vec2};
+
+    /// All that is written in a frame.
+    fn written(context: &Context, lay_out: impl FnMut(&mut Ui)) -> String {
+        let screen = Rect::from_min_size(Pos2::ZERO, Vec2::new(800.0, 2600.0));
+        let input = RawInput { screen_rect: Some(screen), max_texture_side: Some(4096), ..RawInput::default() };
+        let FullOutput { shapes, mut textures_delta, .. } = context.run_ui(input, lay_out);
+        // Nobody shows them.
+        textures_delta.clear();
+        let mut texts = String::new();
+        shapes.iter().for_each(|clipped| read(&clipped.shape, &mut texts));
+        texts
+    }
+
+    fn read(shape: &Shape, texts: &mut String) {
+        match shape {
+            Shape::Text(text) => texts.extend([text.galley.text(), "\n"]),
+            Shape::Vec(shapes) => shapes.iter().for_each(|shape| read(shape, texts)),
+            _ => {}
+        }
+    }
+
+    #[test]
+    fn every_panel_is_laid_out_without_a_screen() {
+        let exhibits = [Exhibit::new("ball".to_owned(), Scene::of(bumpy_ball(1)))];
+        let options = ViewerOptions { renderer: Choice::Cpu, ..ViewerOptions::default() };
+        let coats = [vec![None]];
+        let viewer = Viewer::new(&exhibits, &coats, options).unwrap();
+        let panels = Panel::ALL.to_vec();
+        let options =
+            WindowOptions { name: "ball".to_owned(), size: [800, 2600], panels, has_panels: true, screenshot: None };
+        let (mut app, context) = (App::new(viewer, &options), Context::default());
+        app.opened(&context, "nothing");
+        // Panels unfold in a few frames, and the first knows neither the size of the picture nor how long it takes.
+        let texts = (0..30).map(|_| written(&context, |ui| app.draw(ui))).last().unwrap_or_default();
+        let titles = ["Facets and ranks", "View directions", "Basis", "Photographs", "Frame times", "Keys"];
+        let contents = ["20 layers", "directions", "layer 19", "--capture", "60 a second", "Space", "cpu, "];
+        for word in titles.iter().chain(&contents) {
+            assert!(texts.contains(word), "nothing says '{word}' in {texts}");
+        }
+        assert!(!texts.contains("with the eye"), "light without materials");
+        assert!(written(&context, |ui| app.panel(ui, Panel::Light)).contains("with the eye"));
+        app.panels.clear();
+        let folded = (0..30).map(|_| written(&context, |ui| app.draw(ui))).last().unwrap_or_default();
+        assert!(titles.iter().all(|title| folded.contains(title)) && !folded.contains("--capture"), "{folded}");
     }
 }

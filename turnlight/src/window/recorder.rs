@@ -2,9 +2,11 @@
 
 use super::App;
 use crate::Error;
+#[cfg(feature = "video")]
+use crate::film::Film;
 use crate::output::OutputFolder;
 use crate::viewer::Viewer;
-use ::capture::Camera;
+use ::capture::{Camera, Image};
 use render::film::write_png;
 use render::path::TURN_FRAMES;
 use render::window::egui::Ui;
@@ -13,9 +15,18 @@ use std::path::PathBuf;
 /// Files of one kind and name that are told apart by number.
 const MOST_FILES: usize = 10_000;
 
-/// What names of pictures, and of folders of turns, end with.
+/// What names of pictures, of folders of turns and of films of them end with.
 const PICTURE: &str = ".png";
 const TURN: &str = "-turn";
+#[cfg(feature = "video")]
+const FILM: &str = ".mp4";
+
+/// Frames of a film a second: a turn in three.
+#[cfg(feature = "video")]
+const FPS: f64 = 24.0;
+
+/// What a turn is written as.
+pub(super) const TURN_KIND: &str = if cfg!(feature = "video") { "film" } else { "pictures" };
 
 /// What is being written.
 pub(super) struct Recorder {
@@ -31,11 +42,18 @@ pub(super) struct Recorder {
 
 /// A turn that is being written, a picture a frame of the window.
 struct Turn {
-    folder: OutputFolder,
-    /// What the folder is named by.
-    name: String,
+    reel: Reel,
     cameras: Vec<Camera>,
     next: usize,
+}
+
+/// Where its pictures go.
+enum Reel {
+    /// A folder, and what it is named by.
+    Pictures(OutputFolder, String),
+    /// A film, and its file.
+    #[cfg(feature = "video")]
+    Film(Box<Film>, PathBuf),
 }
 
 impl Recorder {
@@ -99,11 +117,31 @@ impl Recorder {
     }
 
     fn begin(&mut self, viewer: &Viewer<'_>, size: [usize; 2]) -> Result<(), Error> {
-        let folder = OutputFolder::create(&free_name(&self.name, TURN))?;
-        let cameras = viewer.orbit().turn(TURN_FRAMES, size);
-        self.turn = Some(Turn { folder, name: self.name.clone(), cameras, next: 0 });
+        // Films have even sides.
+        let even = size.map(|side| side / 2 * 2);
+        let (reel, size) = match film(&self.name, even) {
+            Some(film) => (film, even),
+            None => {
+                let folder = OutputFolder::create(&free_name(&self.name, TURN))?;
+                (Reel::Pictures(folder, self.name.clone()), size)
+            }
+        };
+        self.turn = Some(Turn { reel, cameras: viewer.orbit().turn(TURN_FRAMES, size), next: 0 });
         Ok(())
     }
+}
+
+/// `None` where this build or this machine writes none.
+#[cfg(feature = "video")]
+fn film(name: &str, size: [usize; 2]) -> Option<Reel> {
+    let path = free_name(name, FILM);
+    let film = Film::create(&path, size, FPS).ok()?;
+    Some(Reel::Film(Box::new(film), path))
+}
+
+#[cfg(not(feature = "video"))]
+fn film(_: &str, _: [usize; 2]) -> Option<Reel> {
+    None
 }
 
 enum Written {
@@ -113,14 +151,30 @@ enum Written {
 
 impl Turn {
     fn advance(mut self, viewer: &mut Viewer<'_>) -> Result<Written, Error> {
-        let Some(camera) = self.cameras.get(self.next) else {
-            // Another window may have taken the name that was free at the start.
-            return Ok(Written::All(self.folder.finish_at_first_free(numbered(&self.name, TURN))?));
-        };
-        let place = self.folder.place(format!("{:04}.png", self.next))?;
-        write_png(&place, &viewer.frame_of(camera))?;
+        let Some(camera) = self.cameras.get(self.next) else { return Ok(Written::All(self.reel.finish()?)) };
+        self.reel.push(self.next, &viewer.frame_of(camera))?;
         self.next += 1;
         Ok(Written::More(self))
+    }
+}
+
+impl Reel {
+    fn push(&mut self, number: usize, frame: &Image<[u8; 4]>) -> Result<(), Error> {
+        match self {
+            Self::Pictures(folder, _) => Ok(write_png(&folder.place(format!("{number:04}.png"))?, frame)?),
+            #[cfg(feature = "video")]
+            Self::Film(film, _) => film.push(frame),
+        }
+    }
+
+    /// Makes it appear at its place, and says where.
+    fn finish(self) -> Result<PathBuf, Error> {
+        match self {
+            // Another window may have taken the name that was free at the start.
+            Self::Pictures(folder, name) => folder.finish_at_first_free(numbered(&name, TURN)),
+            #[cfg(feature = "video")]
+            Self::Film(film, path) => film.finish().map(|()| path),
+        }
     }
 }
 
@@ -141,7 +195,7 @@ impl App<'_> {
             if ui.button("Picture").on_hover_text("as it is, to a PNG in the current folder (S)").clicked() {
                 self.recorder.ask_picture();
             }
-            let hint = format!("{TURN_FRAMES} PNGs in a new folder of the current one (T)");
+            let hint = format!("{TURN_FRAMES} views all around, as {TURN_KIND} in the current folder (T)");
             if ui.button("Turn").on_hover_text(hint).clicked() {
                 self.recorder.ask_turn();
             }

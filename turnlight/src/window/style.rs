@@ -1,8 +1,12 @@
 //! Colours and sizes, as in the browser's player.
 
+use crate::viewer;
 use render::window::egui::{Color32, Context, CornerRadius, FontId, Margin, Stroke, TextStyle, Theme, Vec2};
 
-pub(super) const BACKGROUND: Color32 = Color32::from_rgb(27, 29, 33);
+pub(super) const BACKGROUND: Color32 = {
+    let [r, g, b] = viewer::BACKGROUND;
+    Color32::from_rgb(r, g, b)
+};
 pub(super) const PANEL: Color32 = Color32::from_rgb(34, 37, 42);
 pub(super) const TEXT: Color32 = Color32::from_rgb(232, 230, 227);
 pub(super) const FAINT: Color32 = Color32::from_rgb(169, 167, 163);
