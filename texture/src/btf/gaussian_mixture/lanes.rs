@@ -25,6 +25,8 @@ pub(super) trait Vector: Copy {
     fn times(self, other: Self) -> Self;
     /// `self · factor + term`.
     fn times_plus(self, factor: Self, term: Self) -> Self;
+    /// `self − d²`.
+    fn less_square(self, d: Self) -> Self;
     fn larger(self, other: Self) -> Self;
     /// Bit k is set where lane k is at least the limit's.
     fn at_least(self, limit: Self) -> u32;
@@ -32,12 +34,6 @@ pub(super) trait Vector: Copy {
     fn where_at_least(self, test: Self, limit: Self) -> Self;
     /// Times 2ⁿ, n in the lowest bits of `shifted`.
     fn times_two_to(self, shifted: Self) -> Self;
-
-    /// `self − d²`.
-    #[inline(always)]
-    fn less_square(self, d: Self) -> Self {
-        d.times_plus(Self::splat(0.0).minus(d), self)
-    }
 
     /// `exp` of what is not positive, to 2 units in the last place; 0 below [`FLUSH`].
     /// Cody and Waite's reduction, the polynomial of Cephes' `expf`.
@@ -137,6 +133,11 @@ impl Vector for Plain {
     }
 
     #[inline(always)]
+    fn less_square(self, d: Self) -> Self {
+        self.minus(d.times(d))
+    }
+
+    #[inline(always)]
     fn larger(self, other: Self) -> Self {
         self.zip(other, |a, b| if a > b { a } else { b })
     }
@@ -227,6 +228,12 @@ mod x86 {
         }
 
         #[inline(always)]
+        fn less_square(self, d: Self) -> Self {
+            // SAFETY: see above.
+            Self(unsafe { _mm512_fnmadd_ps(d.0, d.0, self.0) })
+        }
+
+        #[inline(always)]
         fn larger(self, other: Self) -> Self {
             // SAFETY: see above.
             Self(unsafe { _mm512_max_ps(self.0, other.0) })
@@ -298,6 +305,12 @@ mod x86 {
         fn times_plus(self, factor: Self, term: Self) -> Self {
             // SAFETY: see above.
             unsafe { Self(_mm256_fmadd_ps(self.0, factor.0, term.0), _mm256_fmadd_ps(self.1, factor.1, term.1)) }
+        }
+
+        #[inline(always)]
+        fn less_square(self, d: Self) -> Self {
+            // SAFETY: see above.
+            unsafe { Self(_mm256_fnmadd_ps(d.0, d.0, self.0), _mm256_fnmadd_ps(d.1, d.1, self.1)) }
         }
 
         #[inline(always)]
