@@ -11,8 +11,10 @@
 //! s = sin β, for cells `Δα · Δs` are equal solid angles. The source's arccosines lose the sign of y, and exceed 1
 //! by rounding in one of three directions within the plane of x; arctangents do neither.
 
+use super::lanes::Vector;
 use capture::btf::Btf;
 use nalgebra::Vector3;
+use rayon::prelude::*;
 use std::borrow::Cow;
 
 /// Variables of a sample.
@@ -35,6 +37,8 @@ pub(super) struct Grid<'a> {
     pub(super) x: Vec<f32>,
     /// Per row, texels.
     pub(super) y: Vec<f32>,
+    /// Of x and y.
+    pub(super) periods: [Period; 2],
     /// α and s of each light.
     pub(super) lights: Vec<[f32; 2]>,
     /// α and s of each view.
@@ -43,6 +47,74 @@ pub(super) struct Grid<'a> {
     pub(super) mean: Vec<u8>,
     /// (view, light, y, x, channel).
     pub(super) samples: Cow<'a, [f32]>,
+}
+
+/// Whether places along an axis begin again, and after how many texels.
+///
+/// A difference from a mean is that to the mean's nearest image. The sum over all images, a wrapped normal, differs
+/// from this by less than `2 exp(−T²/8σ²)`, T the period.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Period {
+    /// Texels; 0 where they do not.
+    pub(super) length: f32,
+    /// Its inverse; 0 where they do not.
+    inverse: f32,
+}
+
+impl Period {
+    /// After `length` texels.
+    pub(super) fn of(length: usize) -> Self {
+        Self { length: length as f32, inverse: 1.0 / length as f32 }
+    }
+
+    /// The shortest of differences that are whole periods apart.
+    #[inline(always)]
+    pub(super) fn nearest<V: Vector>(self, difference: V) -> V {
+        difference.times(V::splat(self.inverse)).rounded().times_plus(V::splat(-self.length), difference)
+    }
+
+    /// The same of one number.
+    pub(super) fn nearest_of(self, difference: f32) -> f32 {
+        difference - self.length * (difference * self.inverse).round_ties_even()
+    }
+
+    /// The image of a place that lies within the tile.
+    pub(super) fn within(self, place: f64) -> f64 {
+        if self.length > 0.0 { place.rem_euclid(f64::from(self.length)) } else { place }
+    }
+}
+
+/// Texels may differ across the border by this times as much as neighbours within, where the tile continues itself.
+const SEAM: f64 = 1.5;
+
+/// Those of the axes along which the tile continues itself.
+fn periods(btf: &Btf) -> [Period; 2] {
+    let [across, down] = border_steps(btf);
+    [(across, btf.width), (down, btf.height)].map(|([border, within], side)| {
+        if side > 2 && border <= SEAM * within { Period::of(side) } else { Period::default() }
+    })
+}
+
+/// Along x and y: mean difference of texels on both sides of the border, and of neighbours within.
+fn border_steps(btf: &Btf) -> [[f64; 2]; 2] {
+    let (width, height) = (btf.width, btf.height);
+    let of_picture = |picture: &[f32]| {
+        let difference = |a: usize, b: usize| -> f64 {
+            (0..3).map(|c| f64::from((picture[3 * a + c] - picture[3 * b + c]).abs())).sum()
+        };
+        let mut sums = [[0.0; 2]; 2];
+        for texel in 0..width * height {
+            let (x, y) = (texel % width, texel / width);
+            let (right, below) = (y * width + (x + 1) % width, (y + 1) % height * width + x);
+            sums[0][usize::from(x + 1 < width)] += difference(texel, right);
+            sums[1][usize::from(y + 1 < height)] += difference(texel, below);
+        }
+        sums
+    };
+    let pictures: Vec<[[f64; 2]; 2]> = btf.samples.par_chunks(3 * btf.texels()).map(of_picture).collect();
+    let sum = |axis: usize, k: usize| pictures.iter().map(|sums| sums[axis][k]).sum::<f64>();
+    let steps = |axis: usize, side: usize| [sum(axis, 0), sum(axis, 1) / side.saturating_sub(1).max(1) as f64];
+    [steps(0, width), steps(1, height)]
 }
 
 /// α and s = sin β of a unit vector; α is 0 where the direction is along the x axis and has none.
@@ -59,6 +131,7 @@ impl<'a> Grid<'a> {
         Self {
             x: centres(btf.width),
             y: centres(btf.height),
+            periods: periods(btf),
             lights: slices(&btf.lights),
             views: slices(&btf.views),
             mean: mean_picture(btf),
