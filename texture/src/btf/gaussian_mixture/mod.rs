@@ -55,6 +55,7 @@ use capture::btf::Btf;
 use estimation::{Estimate, estimate};
 use mixture::{Component, Packed};
 use nalgebra::Vector3;
+use prediction::Exponents;
 use variables::{FLOORS, Grid, Period, onion_slice};
 
 /// Samples beyond this were not encoded.
@@ -100,6 +101,7 @@ pub struct GaussianMixture {
     components: Vec<Component>,
     /// The components, ready to be evaluated.
     packed: Box<Packed>,
+    exponents: Exponents,
 }
 
 impl Options {
@@ -207,7 +209,8 @@ impl GaussianMixture {
     ) -> Self {
         components.sort_by_key(|c| place_on_curve(c, &frame));
         let packed = Box::new(Packed::new(&components, periods));
-        Self { frame, precision, mean, components, packed }
+        let exponents = Exponents::of([frame.width, frame.height]);
+        Self { frame, precision, mean, components, packed, exponents }
     }
 
     /// M.
@@ -260,7 +263,8 @@ impl Sampler for GaussianMixture {
 
     fn values(&self, texels: &[usize], light: &Vector3<f32>, view: &Vector3<f32>, out: &mut [[f32; 3]]) {
         let (angles, mean) = (angles(light, view), self.mean_colour(light, view));
-        let place = |texel: usize| [texel % self.frame.width, texel / self.frame.width].map(|v| v as f32 + 0.5);
+        let width = self.frame.width;
+        let place = |texel: usize| self.exponents.at(&self.packed, [texel % width, texel / width]);
         for (texels, out) in texels.chunks(prediction::FEW).zip(out.chunks_mut(prediction::FEW)) {
             let found = match *texels {
                 [texel] => [prediction::one(&self.packed, angles, &[place(texel)])[0]; prediction::FEW],

@@ -8,6 +8,7 @@ use super::lanes::{LANES, Row, Vector, kernel};
 use super::mixture::{Likely, Packed, Tile};
 use super::variables::{Grid, INPUTS};
 use rayon::prelude::*;
+use std::sync::OnceLock;
 
 /// Components further below the best than this change an answer by less than the rounding of `f32`.
 pub(super) const REACH: f32 = 18.0;
@@ -68,21 +69,61 @@ fn mixed<V: Vector>(mixture: &Packed, likely: &Likely, row: usize) -> [Row; 3] {
     colours
 }
 
+/// Exponents of x and of y at a place, per component.
+pub(super) type Place<'a> = [&'a [Row]; 2];
+
+/// Exponents of an axis, `((place − mean) · scale)²`, per component.
+pub(super) fn exponents(mixture: &Packed, axis: usize, place: f32) -> Vec<Row> {
+    let [means, scales] = [&mixture.mean, &mixture.scale].map(|all| all[axis].as_chunks::<LANES>().0);
+    let exponent = |mean: f32, scale: f32| (mixture.periods[axis].nearest_of(place - mean) * scale).powi(2);
+    let row = |(mean, scale): (&Row, &Row)| std::array::from_fn(|k| exponent(mean[k], scale[k]));
+    means.iter().zip(scales).map(row).collect()
+}
+
+/// Exponents of each column and row of a tile, found when they are first asked for: at most 4 bytes for each component
+/// and each of them.
+#[derive(Clone, Debug)]
+pub(super) struct Exponents {
+    along: [Vec<OnceLock<Vec<Row>>>; 2],
+}
+
+impl Exponents {
+    /// Of a tile of `size` (columns, rows) texels.
+    pub(super) fn of(size: [usize; 2]) -> Self {
+        Self { along: size.map(|side| vec![OnceLock::new(); side]) }
+    }
+
+    /// Of the middle of the texel in a column and row.
+    pub(super) fn at(&self, mixture: &Packed, texel: [usize; 2]) -> Place<'_> {
+        [0, 1].map(|axis| {
+            let found = &self.along[axis][texel[axis]];
+            found.get_or_init(|| exponents(mixture, axis, texel[axis] as f32 + 0.5)).as_slice()
+        })
+    }
+}
+
+/// What follows from components and size makes no codec another one.
+impl PartialEq for Exponents {
+    fn eq(&self, _: &Self) -> bool {
+        true
+    }
+}
+
 kernel! {
     /// Colours less the mean of a place under one light and view.
-    fn one(mixture: &Packed, angles: [f32; 4], places: &[[f32; 2]; 1]) -> [[f32; 3]; 1] = together, 1
+    fn one(mixture: &Packed, angles: [f32; 4], places: &[Place<'_>; 1]) -> [[f32; 3]; 1] = together, 1
 }
 
 kernel! {
     /// The same of some places: a vector of components is loaded once for all, and left out where it matters to none.
-    fn few(mixture: &Packed, angles: [f32; 4], places: &[[f32; 2]; FEW]) -> [[f32; 3]; FEW] = together, FEW
+    fn few(mixture: &Packed, angles: [f32; 4], places: &[Place<'_>; FEW]) -> [[f32; 3]; FEW] = together, FEW
 }
 
 #[inline(always)]
 pub(super) fn together<V: Vector, const N: usize>(
     mixture: &Packed,
     angles: [f32; 4],
-    places: &[[f32; 2]; N],
+    places: &[Place<'_>; N],
 ) -> [[f32; 3]; N] {
     let mut logs = [[[0.0; LANES]; N]; BLOCK];
     let mut sums = Sums::<V, N>::none();
@@ -100,29 +141,26 @@ pub(super) fn together<V: Vector, const N: usize>(
 fn log_densities<V: Vector, const N: usize>(
     mixture: &Packed,
     angles: [f32; 4],
-    places: &[[f32; 2]; N],
+    places: &[Place<'_>; N],
     first: usize,
     out: &mut [[Row; N]],
 ) -> [f32; N] {
     let count = out.len();
     let bias = of_block(&mixture.input, first, count);
-    let mean: [&[Row]; INPUTS] = std::array::from_fn(|v| of_block(&mixture.mean[v], first, count));
-    let scale: [&[Row]; INPUTS] = std::array::from_fn(|v| of_block(&mixture.scale[v], first, count));
+    let mean = [2, 3, 4, 5].map(|v| of_block(&mixture.mean[v], first, count));
+    let scale = [2, 3, 4, 5].map(|v| of_block(&mixture.scale[v], first, count));
     let mut tops = [V::splat(f32::NEG_INFINITY); N];
     for (g, out) in out.iter_mut().enumerate() {
         let mut energy = V::load(&bias[g]);
         for (v, angle) in angles.into_iter().enumerate() {
-            let off = V::splat(angle).minus(V::load(&mean[2 + v][g]));
-            energy = energy.less_square(off.times(V::load(&scale[2 + v][g])));
+            let off = V::splat(angle).minus(V::load(&mean[v][g]));
+            energy = energy.less_square(off.times(V::load(&scale[v][g])));
         }
-        for ((place, out), top) in places.iter().zip(out).zip(&mut tops) {
-            let mut log = energy;
-            for axis in 0..2 {
-                let off = mixture.periods[axis].nearest(V::splat(place[axis]).minus(V::load(&mean[axis][g])));
-                log = log.less_square(off.times(V::load(&scale[axis][g])));
-            }
-            log.store(out);
-            *top = top.larger(log);
+        for p in 0..N {
+            let [across, down] = places[p].map(|squares| &squares[first + g]);
+            let log = energy.minus(V::load(across)).minus(V::load(down));
+            log.store(&mut out[p]);
+            tops[p] = tops[p].larger(log);
         }
     }
     let mut largest = [0.0; N];

@@ -319,7 +319,8 @@ fn one_component_answers_the_mean_everywhere() {
 
 /// Colour less the mean where x, y and the angles are given.
 fn one(packed: &Packed, [x, y, la, ls, va, vs]: [f32; INPUTS]) -> [f32; 3] {
-    prediction::one(packed, [la, ls, va, vs], &[[x, y]])[0]
+    let exponents = [(0, x), (1, y)].map(|(axis, at)| prediction::exponents(packed, axis, at));
+    prediction::one(packed, [la, ls, va, vs], &[exponents.each_ref().map(Vec::as_slice)])[0]
 }
 
 /// Components of equal deviations along x, with their positions as colours 0, 1, …
@@ -613,7 +614,9 @@ fn plain_loops_and_vector_instructions_agree() {
         assert!((a[0] - b[0]).abs() < 1e-4 * b[0] && (a[8] - b[8]).abs() < 1e-4 * b[8], "{a:?} {b:?}");
     }
     let at = [3.0, 4.0, 0.1, 0.2, -0.3, 0.4];
-    let plain = prediction::together::<Plain, 1>(&packed, [0.1, 0.2, -0.3, 0.4], &[[3.0, 4.0]]);
+    let exponents = [(0, 3.0), (1, 4.0)].map(|(axis, at)| prediction::exponents(&packed, axis, at));
+    let place = exponents.each_ref().map(Vec::as_slice);
+    let plain = prediction::together::<Plain, 1>(&packed, [0.1, 0.2, -0.3, 0.4], &[place]);
     let [a, b] = [one(&packed, at), plain[0]];
     assert!((0..3).all(|c| (a[c] - b[c]).abs() < 1e-6), "{a:?} {b:?}");
 }
