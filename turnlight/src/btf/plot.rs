@@ -25,7 +25,7 @@ pub(super) enum Axis {
     NanosecondsPerAnswer,
 }
 
-/// RMSE over an axis, both logarithmic, one curve per codec, as an SVG document.
+/// RMSE over an axis, both logarithmic, marks of one colour per codec, as an SVG document.
 ///
 /// # Errors
 /// Where the plotting library fails.
@@ -41,6 +41,11 @@ impl Axis {
             Self::BytesPerTexel => Some(evaluation.bytes as f64 / texels as f64),
             Self::NanosecondsPerAnswer => evaluation.speed.map(|speed| 1e9 / speed.evals_per_s_core),
         }
+    }
+
+    /// Whether error follows from it: marks of one codec are then joined.
+    fn joins_sizes(self) -> bool {
+        matches!(self, Self::BytesPerTexel)
     }
 
     fn label(self) -> &'static str {
@@ -81,22 +86,32 @@ fn draw(comparison: &CodecComparison, axis: Axis, svg: &mut String) -> Result<()
     };
     let root = SVGBackend::with_string(svg, (960, 420)).into_drawing_area();
     root.fill(&WHITE)?;
-    let mut chart = ChartBuilder::on(&root)
+    // Beside the plot, where the names cover no mark.
+    let (plot, names) = root.split_horizontally(820);
+    let mut chart = ChartBuilder::on(&plot)
         .margin(10)
         .x_label_area_size(36)
         .y_label_area_size(56)
         .build_cartesian_2d(range(|p| p.0).log_scale(), range(|p| p.1).log_scale())?;
-    chart.configure_mesh().x_desc(axis.label()).y_desc("RMSE, levels of 255").draw()?;
+    let number = |value: &f64| format!("{}", (value * 1000.0).round() / 1000.0);
+    chart
+        .configure_mesh()
+        .x_desc(axis.label())
+        .y_desc("RMSE, levels of 255")
+        .x_label_formatter(&number)
+        .y_label_formatter(&number)
+        .draw()?;
     for (i, curve) in curves.iter().enumerate() {
         let color = COLORS[i % COLORS.len()];
         let style = if i < COLORS.len() { color.filled() } else { color.stroke_width(2) };
-        chart.draw_series(LineSeries::new(curve.points.iter().copied(), color.stroke_width(2)))?;
-        chart
-            .draw_series(curve.points.iter().map(|&p| Circle::new(p, 4, style)))?
-            .label(curve.name)
-            .legend(move |(x, y)| Circle::new((x + 8, y), 4, style));
+        if axis.joins_sizes() {
+            chart.draw_series(LineSeries::new(curve.points.iter().copied(), color.stroke_width(2)))?;
+        }
+        chart.draw_series(curve.points.iter().map(|&p| Circle::new(p, 4, style)))?;
+        let y = 24 + 20 * i as i32;
+        names.draw(&Circle::new((8, y), 4, style))?;
+        names.draw(&Text::new(curve.name, (20, y - 6), ("sans-serif", 13)))?;
     }
-    chart.configure_series_labels().background_style(WHITE.mix(0.8)).border_style(BLACK.mix(0.3)).draw()?;
     drop(chart);
     root.present()?;
     Ok(())

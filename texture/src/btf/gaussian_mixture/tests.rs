@@ -376,6 +376,71 @@ fn order_and_units_do_not_matter() {
 }
 
 #[test]
+fn differences_are_to_the_nearest_image() {
+    let period = Period::of(10);
+    for (difference, nearest) in [(0.0, 0.0), (4.5, 4.5), (5.5, -4.5), (-5.5, 4.5), (9.0, -1.0), (-9.75, 0.25)] {
+        assert_eq!(period.nearest_of(difference), nearest);
+        assert_eq!(period.nearest(Plain::splat(difference)).largest(), nearest);
+        assert_eq!(Period::default().nearest(Plain::splat(difference)).largest(), difference);
+    }
+    assert_eq!((period.within(12.5), period.within(-0.5), Period::default().within(12.5)), (2.5, 9.5, 12.5));
+}
+
+/// Two components at 1 and 5 of a period of 8, told apart by their colours: both images of a place see them alike.
+#[test]
+fn a_place_and_its_image_answer_alike() {
+    let packed = Packed::new(&along_x(&[1.0, 5.0], 0.8), [Period::of(8), Period::default()]);
+    let at = |x: f32| one(&packed, [x, 0.0, 0.0, 0.0, 0.0, 0.0])[0];
+    for (x, image) in [(7.5, -0.5), (7.0, 3.0), (6.25, 14.25)] {
+        assert!((at(x) - at(image)).abs() < 1e-6, "{x}: {} {}", at(x), at(image));
+    }
+    // 1 / (1 + exp((2.9² − 1.1²) / 2 · 0.8²)), and with 1.5² − 2.5².
+    assert!((at(7.9) - 0.003_593_6).abs() < 1e-6 && (at(6.5) - 0.957_912).abs() < 1e-6, "{} {}", at(7.9), at(6.5));
+    let picture = prediction::picture(&packed, &[7.5, 6.25], &[0.0], [0.0; 4]);
+    assert!((picture[0] - at(7.5)).abs() < 1e-6 && (picture[3] - at(6.25)).abs() < 1e-6, "{picture:?}");
+}
+
+#[test]
+fn tiles_that_continue_themselves_are_told_by_their_borders() {
+    let periods = |btf: &Btf| Grid::of(btf).periods.map(|period| period.length);
+    let ramp = tile([12, 8], [rings(3), rings(3)], |x, y, l, v| stripes(8.0 * x / 36.0, y, l, v));
+    assert_eq!(periods(&ramp), [0.0, 8.0]);
+    assert_eq!(periods(&striped()), [8.0; 2]);
+}
+
+/// A bump anywhere, upon the corner as in the middle, is fitted alike.
+#[test]
+fn where_a_tile_begins_makes_no_difference() {
+    let bump = |shift: [f64; 2]| {
+        let far = |a: f64| (a.rem_euclid(12.0)).min(12.0 - a.rem_euclid(12.0));
+        tile([12, 12], [rings(3), rings(3)], |x, y, l, _| {
+            [0.2 + 0.5 * l.z * (-(far(x - shift[0]).powi(2) + far(y - shift[1]).powi(2)) / 12.0).exp(); 3]
+        })
+    };
+    let in_the_middle = bump([6.0; 2]);
+    let (grid, pairs) = (Grid::of(&in_the_middle), all_pairs(&in_the_middle));
+    assert_eq!(grid.periods, [Period::of(12); 2]);
+    let components = start(&grid, &pairs, 9, &SHAPES[0], &FLOORS, 1);
+    let after_six_rounds = |shift: f64| {
+        let btf = bump([6.0 + shift; 2]);
+        let grid = Grid::of(&btf);
+        let moved = |c: &Component| {
+            let mut moved = *c;
+            moved.mean[..2].iter_mut().for_each(|mean| *mean = grid.periods[0].within(*mean + shift));
+            moved
+        };
+        let mut components: Vec<Component> = components.iter().map(moved).collect();
+        for _ in 0..6 {
+            let found = expect(&grid, &Packed::new(&components, grid.periods), all(&pairs), 14.0);
+            components = maximise(&grid, &components, &found, &FLOORS);
+        }
+        likelihood(&expect(&grid, &Packed::new(&components, grid.periods), all(&pairs), 14.0))
+    };
+    let [middle, corner, between] = [0.0, 6.0, 3.0].map(after_six_rounds);
+    assert!((corner - middle).abs() < 1e-4 && (between - middle).abs() < 1e-4, "{middle} {corner} {between}");
+}
+
+#[test]
 fn far_from_all_components_the_nearest_answers() {
     let packed = Packed::new(&along_x(&[-1.0, 1.0], 0.01), Default::default());
     assert_eq!(one(&packed, [50.0, 50.0, 1.5, 1.0, 1.5, 1.0])[0], 1.0);
