@@ -23,7 +23,7 @@
 //! An answer: M densities of six variables, sixteen at a time; those of light and eye once for texels asked for together.
 //!
 //! **Tiles** that continue themselves are coded so: along an axis where texels differ no more across the border than
-//! within, the difference of a place from a mean is that to the nearest of the mean's images, in the fit as in
+//! somewhere within, the difference of a place from a mean is that to the nearest of the mean's images, in the fit as in
 //! answers. Components wider than a third of the tile lose what would reach around it ([`variables::Period`]).
 //!
 //! **Limits**: structures and highlights sharper than the components are wide are blurred, and of a tile whose
@@ -140,6 +140,9 @@ pub fn fit(btf: &Btf, options: &Options) -> Result<(GaussianMixture, FitReport),
     });
     let found = estimate(&grid, &pairs, count, options);
     describe(&found, count, options, &mut notes);
+    for (axis, _) in ["x", "y"].iter().zip(grid.periods).filter(|(_, period)| period.length > 0.0) {
+        notes.push(format!("the tile continues itself along {axis}"));
+    }
     let mut components: Vec<Component> =
         found.components.iter().map(|c| storage::rounded(c, options.precision, &frame)).collect();
     if options.refit {

@@ -84,37 +84,38 @@ impl Period {
     }
 }
 
-/// Texels may differ across the border by this times as much as neighbours within, where the tile continues itself.
-const SEAM: f64 = 1.5;
+/// Where the tile continues itself, texels differ across the border by at most this times what some neighbours within do.
+const SEAM: f64 = 1.1;
 
 /// Those of the axes along which the tile continues itself.
 fn periods(btf: &Btf) -> [Period; 2] {
-    let [across, down] = border_steps(btf);
-    [(across, btf.width), (down, btf.height)].map(|([border, within], side)| {
-        if side > 2 && border <= SEAM * within { Period::of(side) } else { Period::default() }
-    })
+    let continues = |steps: &[f64]| match steps {
+        [within @ .., border] => within.len() > 1 && *border <= SEAM * within.iter().copied().fold(0.0, f64::max),
+        [] => false,
+    };
+    let [across, down] = steps(btf).map(|steps| continues(&steps));
+    [(across, btf.width), (down, btf.height)]
+        .map(|(continues, side)| if continues { Period::of(side) } else { Period::default() })
 }
 
-/// Along x and y: mean difference of texels on both sides of the border, and of neighbours within.
-fn border_steps(btf: &Btf) -> [[f64; 2]; 2] {
+/// How much texels differ from those of the next column, and of the next row, summed over both; last, across the border.
+fn steps(btf: &Btf) -> [Vec<f64>; 2] {
     let (width, height) = (btf.width, btf.height);
     let of_picture = |picture: &[f32]| {
         let difference = |a: usize, b: usize| -> f64 {
             (0..3).map(|c| f64::from((picture[3 * a + c] - picture[3 * b + c]).abs())).sum()
         };
-        let mut sums = [[0.0; 2]; 2];
+        let (mut across, mut down) = (vec![0.0; width], vec![0.0; height]);
         for texel in 0..width * height {
             let (x, y) = (texel % width, texel / width);
-            let (right, below) = (y * width + (x + 1) % width, (y + 1) % height * width + x);
-            sums[0][usize::from(x + 1 < width)] += difference(texel, right);
-            sums[1][usize::from(y + 1 < height)] += difference(texel, below);
+            across[x] += difference(texel, y * width + (x + 1) % width);
+            down[y] += difference(texel, (y + 1) % height * width + x);
         }
-        sums
+        [across, down]
     };
-    let pictures: Vec<[[f64; 2]; 2]> = btf.samples.par_chunks(3 * btf.texels()).map(of_picture).collect();
-    let sum = |axis: usize, k: usize| pictures.iter().map(|sums| sums[axis][k]).sum::<f64>();
-    let steps = |axis: usize, side: usize| [sum(axis, 0), sum(axis, 1) / side.saturating_sub(1).max(1) as f64];
-    [steps(0, width), steps(1, height)]
+    let pictures: Vec<[Vec<f64>; 2]> = btf.samples.par_chunks(3 * btf.texels()).map(of_picture).collect();
+    let sum = |axis: usize, k: usize| pictures.iter().map(|steps| steps[axis][k]).sum::<f64>();
+    [(0..width).map(|x| sum(0, x)).collect(), (0..height).map(|y| sum(1, y)).collect()]
 }
 
 /// α and s = sin β of a unit vector; α is 0 where the direction is along the x axis and has none.
