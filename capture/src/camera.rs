@@ -130,6 +130,12 @@ impl Distortion {
 }
 
 impl Intrinsics {
+    /// A pinhole of `focal` pixels whose axis goes through the middle of the image, of `[width, height]` pixels.
+    pub fn pinhole(focal: f64, [width, height]: [usize; 2]) -> Self {
+        let (cx, cy) = (0.5 * width as f64, 0.5 * height as f64);
+        Self { fx: focal, fy: focal, skew: 0.0, cx, cy, distortion: Distortion::default(), width, height }
+    }
+
     /// `[[fx, skew, cx], [0, fy, cy], [0, 0, 1]]`.
     pub fn matrix(&self) -> Matrix3<f64> {
         Matrix3::new(self.fx, self.skew, self.cx, 0.0, self.fy, self.cy, 0.0, 0.0, 1.0)

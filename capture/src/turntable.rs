@@ -151,12 +151,10 @@ fn check_size(image: &Path, camera: &Camera) -> Result<(), CaptureError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Distortion, Image, Intrinsics, MaskSource, write_matte, write_rgb};
+    use crate::{Image, Intrinsics, MaskSource, write_matte, write_rgb};
 
     fn camera() -> Camera {
-        let distortion = Distortion::default();
-        let intrinsics =
-            Intrinsics { fx: 90.0, fy: 90.0, skew: 0.0, cx: 16.0, cy: 12.0, distortion, width: 32, height: 24 };
+        let intrinsics = Intrinsics::pinhole(90.0, [32, 24]);
         let rotation = Rotation3::from_euler_angles(1.9, 0.1, 0.2).into_inner();
         Camera { intrinsics, rotation, translation: Vector3::new(0.1, 0.2, 3.0) }
     }

@@ -3,7 +3,7 @@
 
 use crate::error::SynthError;
 use crate::sampler::splitmix;
-use capture::{Aabb, Camera, Distortion, Intrinsics};
+use capture::{Aabb, Camera, Intrinsics};
 use geometry::Mesh;
 use nalgebra::{Matrix3, Point3, Vector3};
 use std::f64::consts::{PI, TAU};
@@ -111,20 +111,11 @@ pub(crate) fn cameras(stations: &[Station], mesh: &Mesh, aabb: &Aabb, size: [usi
     let target = aabb.center();
     let radius = 0.5 * aabb.diagonal();
     let distance = radius / (0.5 * VIEW_ANGLE_DEG.to_radians()).sin();
-    let lens = |focal: f64| Intrinsics {
-        fx: focal,
-        fy: focal,
-        skew: 0.0,
-        cx: 0.5 * size[0] as f64,
-        cy: 0.5 * size[1] as f64,
-        distortion: Distortion::default(),
-        width: size[0],
-        height: size[1],
-    };
-    let mut cameras: Vec<Camera> = stations.iter().map(|s| look_at(&target, s, distance, lens(1.0))).collect();
+    let mut cameras: Vec<Camera> =
+        stations.iter().map(|s| look_at(&target, s, distance, Intrinsics::pinhole(1.0, size))).collect();
     let [x, y] = extent(&cameras, mesh);
     let focal = FILL * (0.5 * size[0] as f64 / x).min(0.5 * size[1] as f64 / y);
-    cameras.iter_mut().for_each(|c| c.intrinsics = lens(focal));
+    cameras.iter_mut().for_each(|c| c.intrinsics = Intrinsics::pinhole(focal, size));
     cameras
 }
 

@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test: failing is what unwrap is for")]
 
-use capture::{Aabb, Camera, Distortion, Image, Intrinsics, View};
+use capture::{Aabb, Camera, Image, Intrinsics, View};
 use data_synth::hull_truth::{Ball, BallHull, ConvexHull, PolyhedronHull};
 use geometry::{AccuracyOptions, HullOptions, Mesh, accuracy, visual_hull};
 use nalgebra::{Matrix3, Point2, Point3, Vector3};
@@ -21,18 +21,7 @@ fn cameras(size: usize) -> Vec<Camera> {
         let right = Vector3::new(-sa, ca, 0.0);
         let rotation =
             Matrix3::from_rows(&[right.transpose(), (-outward).cross(&right).transpose(), -outward.transpose()]);
-        let (focal, middle) = (size as f64 * 6.0 / 3.2, size as f64 / 2.0);
-        let distortion = Distortion::default();
-        let intrinsics = Intrinsics {
-            fx: focal,
-            fy: focal,
-            skew: 0.0,
-            cx: middle,
-            cy: middle,
-            distortion,
-            width: size,
-            height: size,
-        };
+        let intrinsics = Intrinsics::pinhole(size as f64 * 6.0 / 3.2, [size, size]);
         Camera { intrinsics, rotation, translation: -(rotation * outward * 6.0) }
     };
     (0..9).map(at).collect()

@@ -256,20 +256,11 @@ fn clip(points: [Vector3<f64>; 3], near: f64) -> Vec<Vector3<f64>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use capture::{Distortion, Intrinsics};
+    use capture::Intrinsics;
     use nalgebra::{Matrix3, Point3};
 
     fn camera(width: usize, height: usize, focal: f64) -> Camera {
-        let intrinsics = Intrinsics {
-            fx: focal,
-            fy: focal,
-            skew: 0.0,
-            cx: width as f64 / 2.0,
-            cy: height as f64 / 2.0,
-            distortion: Distortion::default(),
-            width,
-            height,
-        };
+        let intrinsics = Intrinsics::pinhole(focal, [width, height]);
         Camera { intrinsics, rotation: Matrix3::identity(), translation: Vector3::zeros() }
     }
 

@@ -173,16 +173,7 @@ fn intrinsics(like: Option<&Camera>, width: usize, height: usize) -> Intrinsics 
         .filter(|f| f.is_finite() && *f > 0.0)
         .unwrap_or(FOCAL_PER_HEIGHT);
     let focal = per_height * height as f64;
-    Intrinsics {
-        fx: focal,
-        fy: focal,
-        skew: 0.0,
-        cx: width as f64 / 2.0,
-        cy: height as f64 / 2.0,
-        distortion: Distortion::default(),
-        width,
-        height,
-    }
+    Intrinsics::pinhole(focal, [width, height])
 }
 
 /// World to camera, from a place in direction `outward` towards the centre, `up` upwards.

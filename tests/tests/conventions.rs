@@ -1,6 +1,6 @@
 //! Each test probes the row of its name in `docs/conventions.md`.
 
-use capture::{Camera, Capture, Distortion, Image, Intrinsics, LoadOptions};
+use capture::{Camera, Capture, Image, Intrinsics, LoadOptions};
 use geometry::{Mesh, TexturedMesh};
 use nalgebra::{Matrix3, Point2, Point3, Vector3};
 use render::{RenderOptions, cpu};
@@ -9,16 +9,7 @@ use texture::metrics;
 /// 100 × 80 pixels, looking from z = −5 along +z of the world, its axes those of the world.
 fn camera() -> Camera {
     Camera {
-        intrinsics: Intrinsics {
-            fx: 200.0,
-            fy: 200.0,
-            skew: 0.0,
-            cx: 50.0,
-            cy: 40.0,
-            distortion: Distortion::default(),
-            width: 100,
-            height: 80,
-        },
+        intrinsics: Intrinsics::pinhole(200.0, [100, 80]),
         rotation: Matrix3::identity(),
         translation: Vector3::new(0.0, 0.0, 5.0),
     }

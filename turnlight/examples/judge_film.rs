@@ -6,7 +6,7 @@
 //! cargo run --release -p turnlight --example judge_film -- found truth
 //! ```
 
-use capture::{Camera, Capture, Image, read_matte};
+use capture::{Camera, Capture, Image, read_matte, signed_distance};
 use nalgebra::Matrix3;
 use serde_json::Value;
 use std::error::Error;
@@ -21,12 +21,20 @@ struct Pair {
     angles: Option<[f64; 2]>,
     /// Pixels of the object: in both, too many, too few.
     counts: [f64; 3],
+    /// Of the pixels too many or too few, those that the true edge runs through or beside.
+    at_edge: f64,
 }
 
 impl Pair {
     fn iou(&self) -> f64 {
         let [both, extra, missing] = self.counts;
         both / (both + extra + missing).max(1.0)
+    }
+
+    /// Pixels too many or too few within a pixel of the true edge, and further off, as shares of the true object.
+    fn errors(&self) -> [f64; 2] {
+        let [both, extra, missing] = self.counts;
+        [self.at_edge, extra + missing - self.at_edge].map(|count| count / (both + missing).max(1.0))
     }
 
     /// World of the capture to world of the truth.
@@ -54,6 +62,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     println!("angles off by {:.4}° at most", largest_angle_error(&pairs));
     let ious: Vec<f64> = pairs.iter().map(Pair::iou).collect();
     let least = ious.iter().copied().fold(1.0, f64::min);
+    let mean = |side: usize| 100.0 * pairs.iter().map(|p| p.errors()[side]).sum::<f64>() / pairs.len() as f64;
+    println!("wrong within a pixel of the true edge {:.2} %, further off {:.2} %", mean(0), mean(1));
     println!("{} frames, IoU {:.4}, least {least:.4}", ious.len(), ious.iter().sum::<f64>() / ious.len() as f64);
     Ok(())
 }
@@ -72,13 +82,15 @@ fn pairs(found: &Path, truth: &Path) -> Result<Vec<Pair>, Box<dyn Error>> {
         let (ours, true_one) = (found.frames.get(at), truth.frames.get(position));
         let (ours, true_one) = ours.zip(true_one).ok_or("the truth is of another film")?;
         let masks = ours.mask_path.as_ref().zip(true_one.mask_path.as_ref()).ok_or("a frame has no mask")?;
+        let mattes = [read_matte(masks.0)?, read_matte(masks.1)?];
         let angles = frame["angle_deg"].as_f64().zip(known["frames"][position]["angle_deg"].as_f64());
         Ok(Pair {
             position,
             found: ours.camera,
             truth: true_one.camera,
             angles: angles.map(|(a, b)| [a, b]),
-            counts: counts(&read_matte(masks.0)?, &read_matte(masks.1)?),
+            counts: counts(&mattes[0], &mattes[1]),
+            at_edge: wrong_at_edge(&mattes[0], &mattes[1]),
         })
     })
     .collect()
@@ -90,6 +102,12 @@ fn counts(found: &Image<u8>, truth: &Image<u8>) -> [f64; 3] {
         let one = |is: bool| f64::from(u8::from(is));
         [both + one(f && t), extra + one(f && !t), missing + one(!f && t)]
     })
+}
+
+fn wrong_at_edge(found: &Image<u8>, truth: &Image<u8>) -> f64 {
+    let distance = signed_distance(truth);
+    let pixels = found.pixels().iter().zip(truth.pixels()).zip(distance.pixels());
+    pixels.filter(|((f, t), d)| (**f >= 128) != (**t >= 128) && d.abs() <= 1.0).count() as f64
 }
 
 /// Where the platter stood in the first frame is nobody's to know: the median difference is left out.

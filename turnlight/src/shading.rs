@@ -83,7 +83,7 @@ fn linear(level: u8) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use capture::{Camera, Distortion, Image, Intrinsics};
+    use capture::{Camera, Image, Intrinsics};
     use nalgebra::Matrix3;
 
     /// A square `z = depth` that faces the camera at the origin, split in two.
@@ -94,9 +94,7 @@ mod tests {
     }
 
     fn view(level: u8) -> View {
-        let distortion = Distortion::default();
-        let intrinsics =
-            Intrinsics { fx: 60.0, fy: 60.0, skew: 0.0, cx: 32.0, cy: 24.0, distortion, width: 64, height: 48 };
+        let intrinsics = Intrinsics::pinhole(60.0, [64, 48]);
         View {
             index: 0,
             name: String::new(),

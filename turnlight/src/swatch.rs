@@ -5,7 +5,7 @@
 //! equator, across the cloth. On a mesh as many tiles as asked for measure the longest side of its box.
 
 use crate::Error;
-use capture::{Camera, Distortion, Image, Intrinsics};
+use capture::{Camera, Image, Intrinsics};
 use geometry::mesh::io::read_mesh;
 use geometry::{Mesh, TexturedMesh};
 use nalgebra::{Matrix3, Point2, Point3, Vector3};
@@ -116,10 +116,7 @@ pub fn camera(mesh: &Mesh, from: &Vector3<f64>, [width, height]: [usize; 2]) -> 
     let focal = 0.5 * width.max(height) as f64 / (0.5 * FIELD_OF_VIEW).tan();
     let shorter = (0.5 * width.min(height) as f64 / focal).atan();
     let eye = center - forward * (1.05 * radius / shorter.sin());
-    let (cx, cy) = (0.5 * width as f64, 0.5 * height as f64);
-    let distortion = Distortion::default();
-    let intrinsics = Intrinsics { fx: focal, fy: focal, skew: 0.0, cx, cy, distortion, width, height };
-    Camera { intrinsics, rotation, translation: -(rotation * eye.coords) }
+    Camera { intrinsics: Intrinsics::pinhole(focal, [width, height]), rotation, translation: -(rotation * eye.coords) }
 }
 
 /// `tiles` repetitions across a picture, flat and seen from one direction throughout.

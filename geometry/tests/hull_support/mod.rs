@@ -1,7 +1,7 @@
 //! Scenes with exact silhouettes, and readers of the shared captures, for the hull tests.
 #![allow(dead_code, unreachable_pub, clippy::unwrap_used, reason = "test support; each test binary uses its own part")]
 
-use capture::{Camera, Capture, Distortion, Image, Intrinsics, LoadOptions, View};
+use capture::{Camera, Capture, Image, Intrinsics, LoadOptions, View};
 use nalgebra::{Matrix3, Point2, Point3, Vector3};
 use std::path::{Path, PathBuf};
 
@@ -11,11 +11,7 @@ pub fn looking_at_origin(eye: Point3<f64>, up: Vector3<f64>, focal: f64, size: u
     let x = z.cross(&up).normalize();
     let y = z.cross(&x);
     let rotation = Matrix3::from_rows(&[x.transpose(), y.transpose(), z.transpose()]);
-    let middle = size as f64 / 2.0;
-    let distortion = Distortion::default();
-    let intrinsics =
-        Intrinsics { fx: focal, fy: focal, skew: 0.0, cx: middle, cy: middle, distortion, width: size, height: size };
-    Camera { intrinsics, rotation, translation: -(rotation * eye.coords) }
+    Camera { intrinsics: Intrinsics::pinhole(focal, [size, size]), rotation, translation: -(rotation * eye.coords) }
 }
 
 /// A view whose matte is the coverage of `inside(pixel)`, by `samples²` samples a pixel.

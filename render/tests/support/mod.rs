@@ -2,7 +2,7 @@
 
 #![allow(dead_code, reason = "every test binary uses some of it")]
 
-use capture::{Camera, Distortion, Image, Intrinsics};
+use capture::{Camera, Image, Intrinsics};
 use geometry::{Mesh, TexturedMesh};
 use nalgebra::{Matrix3, Point2, Point3, Vector3};
 use std::f64::consts::TAU;
@@ -87,15 +87,6 @@ pub(crate) fn look_at(eye: Point3<f64>, target: Point3<f64>, focal: f64, width: 
     let right = forward.cross(&Vector3::z()).try_normalize(1e-9).unwrap_or_else(Vector3::x);
     let down = forward.cross(&right);
     let rotation = Matrix3::from_rows(&[right.transpose(), down.transpose(), forward.transpose()]);
-    let intrinsics = Intrinsics {
-        fx: focal,
-        fy: focal,
-        skew: 0.0,
-        cx: width as f64 / 2.0,
-        cy: height as f64 / 2.0,
-        distortion: Distortion::default(),
-        width,
-        height,
-    };
+    let intrinsics = Intrinsics::pinhole(focal, [width, height]);
     Camera { intrinsics, rotation, translation: -(rotation * eye.coords) }
 }

@@ -3,7 +3,7 @@
 #![allow(dead_code, reason = "every test binary uses some of it")]
 #![allow(clippy::unwrap_used, reason = "a helper that fails fails its test")]
 
-use capture::{Camera, Distortion, Image, Intrinsics, View};
+use capture::{Camera, Image, Intrinsics, View};
 use geometry::{Mesh, TexturedMesh};
 use nalgebra::{Matrix3, Point2, Point3, Vector3};
 use std::f64::consts::TAU;
@@ -81,17 +81,7 @@ pub(crate) fn camera(eye: Point3<f64>) -> Camera {
     let right = forward.cross(&Vector3::z()).try_normalize(1e-9).unwrap_or_else(Vector3::x);
     let down = forward.cross(&right);
     let rotation = Matrix3::from_rows(&[right.transpose(), down.transpose(), forward.transpose()]);
-    let (width, height) = (SIZE, SIZE);
-    let intrinsics = Intrinsics {
-        fx: 1.3 * SIZE as f64,
-        fy: 1.3 * SIZE as f64,
-        skew: 0.0,
-        cx: 0.5 * width as f64,
-        cy: 0.5 * height as f64,
-        distortion: Distortion::default(),
-        width,
-        height,
-    };
+    let intrinsics = Intrinsics::pinhole(1.3 * SIZE as f64, [SIZE, SIZE]);
     Camera { intrinsics, rotation, translation: -(rotation * eye.coords) }
 }
 

@@ -1,5 +1,5 @@
 use super::*;
-use capture::{Aabb, Camera, Distortion, Image, Intrinsics};
+use capture::{Aabb, Camera, Image, Intrinsics};
 use nalgebra::{Matrix3, Point3, Vector3};
 
 fn frame(position: usize) -> FrameReport {
@@ -63,9 +63,7 @@ fn report() -> FootageReport {
 }
 
 fn camera() -> Camera {
-    let distortion = Distortion::default();
-    let intrinsics =
-        Intrinsics { fx: 800.0, fy: 800.0, skew: 0.0, cx: 320.0, cy: 240.0, distortion, width: 640, height: 480 };
+    let intrinsics = Intrinsics::pinhole(800.0, [640, 480]);
     Camera { intrinsics, rotation: Matrix3::identity(), translation: Vector3::new(0.0, 0.0, 2.0) }
 }
 

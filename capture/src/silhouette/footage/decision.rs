@@ -8,11 +8,9 @@ use super::palette::Palette;
 use crate::Image;
 use crate::matte::{components, signed_distance};
 
-/// Log odds gained well inside the hull.
-const TRUST: f32 = 9.0;
-
-/// Log odds gained per pixel inside the hull.
-const SLOPE: f32 = 0.35;
+/// Log odds gained inside the hull: enough where the picture says nothing, and no more. The hull fills what few frames look
+/// through, a loop of rope or the gap behind a tusk; what these see there is to be believed.
+const TRUST: f32 = 0.5;
 
 /// Log odds that a pixel of border costs where the picture is even.
 const BORDER: f32 = 7.5;
@@ -39,7 +37,7 @@ pub(super) fn decided(
 ) -> Image<u8> {
     let distance = signed_distance(hull);
     let gain = odds.log_odds.pixels().iter().zip(distance.pixels()).map(|(&l, &d)| {
-        let prior = if d > 0.0 { (SLOPE * d).min(TRUST) } else { distrust * d };
+        let prior = if d > 0.0 { TRUST } else { distrust * d };
         cost(l + prior)
     });
     let gain = Image::from_pixels(hull.width(), hull.height(), gain.collect()).unwrap_or_default();
