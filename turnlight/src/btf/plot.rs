@@ -2,7 +2,7 @@
 
 use super::{CodecComparison, Evaluation};
 use crate::Error;
-use plotters::coord::combinators::IntoLogRange;
+use plotters::coord::combinators::{BindKeyPoints, IntoLogRange};
 use plotters::prelude::*;
 
 /// Told apart by the colour-blind too (Okabe and Ito, 2008), then again with hollow marks.
@@ -25,7 +25,7 @@ pub(super) enum Axis {
     NanosecondsPerAnswer,
 }
 
-/// RMSE over an axis, both logarithmic, marks of one colour per codec, as an SVG document.
+/// RMSE, from 0, over a logarithmic axis, marks of one colour per codec, as an SVG document.
 ///
 /// # Errors
 /// Where the plotting library fails.
@@ -84,6 +84,7 @@ fn draw(comparison: &CodecComparison, axis: Axis, svg: &mut String) -> Result<()
         let (low, high) = values.fold((f64::MAX, f64::MIN), |(low, high), v| (low.min(v), high.max(v)));
         if low > high { 1.0..10.0 } else { low / 1.3..high * 1.3 }
     };
+    let along = range(|p| p.0);
     let root = SVGBackend::with_string(svg, (960, 420)).into_drawing_area();
     root.fill(&WHITE)?;
     // Beside the plot, where the names cover no mark.
@@ -92,7 +93,7 @@ fn draw(comparison: &CodecComparison, axis: Axis, svg: &mut String) -> Result<()
         .margin(10)
         .x_label_area_size(36)
         .y_label_area_size(56)
-        .build_cartesian_2d(range(|p| p.0).log_scale(), range(|p| p.1).log_scale())?;
+        .build_cartesian_2d(along.clone().log_scale().with_key_points(ticks(&along)), 0.0..range(|p| p.1).end)?;
     let number = |value: &f64| format!("{}", (value * 1000.0).round() / 1000.0);
     chart
         .configure_mesh()
@@ -115,4 +116,11 @@ fn draw(comparison: &CodecComparison, axis: Axis, svg: &mut String) -> Result<()
     drop(chart);
     root.present()?;
     Ok(())
+}
+
+/// 1, 2 and 5 times powers of ten within a range.
+fn ticks(range: &std::ops::Range<f64>) -> Vec<f64> {
+    let (first, last) = (range.start.log10().floor() as i32, range.end.log10().ceil() as i32);
+    let steps = (first..=last).flat_map(|power| [1.0, 2.0, 5.0].map(|step| step * 10f64.powi(power)));
+    steps.filter(|tick| range.contains(tick)).collect()
 }
