@@ -112,6 +112,7 @@ fn encoder<W: Write>(to: W, width: u32, height: u32) -> png::Encoder<'static, W>
     let mut encoder = png::Encoder::new(to, width, height);
     encoder.set_color(png::ColorType::Rgba);
     encoder.set_depth(png::BitDepth::Eight);
+    encoder.set_compression(png::Compression::Fast);
     encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
     encoder
 }

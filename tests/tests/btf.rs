@@ -108,19 +108,27 @@ fn damaged_materials_and_wrong_data_are_named() {
 #[test]
 fn codecs_are_compared_on_one_page() {
     let place = place();
-    let codecs = "pca,ptm,gmrf";
+    let codecs = "pca,local-pca,ptm,gmrf";
     let args = ["btf", "compare", "data", "-o", "report", "--codecs", codecs, "--ratios", "20,60"];
     let found = done(place.path(), &args);
     let runs = found["runs"].as_array().expect("runs");
     let names: Vec<&str> = runs.iter().filter_map(|run| run["name"].as_str()).collect();
-    assert_eq!(names, ["pca", "pca", "ptm", "gmrf"]);
+    assert_eq!(names, ["pca", "pca", "local-pca", "local-pca", "ptm", "gmrf"]);
     assert!(runs.iter().all(|run| run["fault"].is_null() && run["rmse"].is_f64()), "{found}");
     // The file is never larger than asked.
-    for run in &runs[..2] {
+    for run in &runs[..4] {
         assert!(run["ratio"].as_f64() >= run["ratio_asked"].as_f64(), "{run}");
     }
+    // Of the two with several sizes, each is as far above the other as that below it.
+    let deltas = found["deltas"].as_array().expect("deltas");
+    let pairs: Vec<[&Value; 2]> = deltas.iter().map(|delta| [&delta["codec"], &delta["against"]]).collect();
+    assert_eq!(pairs, [["pca", "local-pca"], ["local-pca", "pca"]]);
+    for key in ["rmse", "psnr_db"] {
+        let [there, back] = [0, 1].map(|k: usize| deltas[k][key].as_f64().expect("a figure"));
+        assert!(there != 0.0 && (there + back).abs() < 1e-9, "{key}: {there} {back}");
+    }
     let page = fs::read_to_string(place.path().join("report/report.html")).expect("a page");
-    assert!(page.contains("<svg") && page.matches("data:image/png").count() == 4);
+    assert!(page.contains("<svg") && page.matches("data:image/png").count() == 6);
 }
 
 #[test]

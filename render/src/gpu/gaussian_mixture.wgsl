@@ -1,6 +1,6 @@
 // A Gaussian mixture: the colour expected of a texel, light and view; `texture::btf::gaussian_mixture`.
 // tables[0]: first component, components, first mean colour, lights. tables[1], tables[2]: lights and views as
-// (first number, sites, triangles, border edges).
+// (first number, sites, triangles, border edges). tables[3]: after how many texels x and y begin again, 0 where they do not.
 
 struct Place {
     mean: vec3<f32>,
@@ -29,12 +29,15 @@ fn place(light: vec3<f32>, view: vec3<f32>) -> Place {
 
 fn value(texel: u32, place: Place) -> vec3<f32> {
     let at = vec2(f32(texel % coat.size.x), f32(texel / coat.size.x)) + 0.5;
+    let period = bitcast<vec2<f32>>(coat.tables[3].xy);
+    let inverse = select(vec2(0.0), 1.0 / max(period, vec2(1.0)), period > vec2(0.0));
     var best = -1e30;
     var sum = vec4(0.0);
     for (var m = 0u; m < coat.tables[0].y; m++) {
         let c = coat.tables[0].x + COMPONENT * m;
         // Means and √½/σ of x, y; of light; of view.
-        let z = (at - pair(c)) * pair(c + 6u);
+        let off = at - pair(c);
+        let z = (off - period * round(off * inverse)) * pair(c + 6u);
         let l = (place.angles.xy - pair(c + 2u)) * pair(c + 8u);
         let v = (place.angles.zw - pair(c + 4u)) * pair(c + 10u);
         let log = number(c + 15u) - dot(z, z) - dot(l, l) - dot(v, v);

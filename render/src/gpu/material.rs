@@ -246,7 +246,8 @@ fn of_mixture(tables: &MixtureTables, lights: &DirectionSet, views: &DirectionSe
     let mean = row.here();
     row.floats(tables.mean.as_flattened());
     let sets = [lights, views].map(|set| row.directions(set));
-    (row.0, [[0, tables.components.len() as u32, mean, lights.len() as u32], sets[0], sets[1], [0; 4]])
+    let [x, y] = tables.periods.map(f32::to_bits);
+    (row.0, [[0, tables.components.len() as u32, mean, lights.len() as u32], sets[0], sets[1], [x, y, 0, 0]])
 }
 
 /// Tables and layout of `multilevel_vq.wgsl`.

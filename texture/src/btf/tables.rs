@@ -12,11 +12,13 @@ pub enum Tables {
 }
 
 /// `mean(l, v) + Σ share · colour`, shares proportional to `exp(bias − Σ ((input − mean) · scale)²)`; inputs are
-/// x, y, α and s of the light, α and s of the view.
+/// x, y, α and s of the light, α and s of the view. Differences of x and y are to the mean's nearest image.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MixtureTables {
     /// Components.
     pub components: Vec<MixtureComponent>,
+    /// After how many texels x and y begin again; 0 where they do not.
+    pub periods: [f32; 2],
     /// Mean colours (view, light), to be interpolated between directions.
     pub mean: Vec<[f32; 3]>,
 }

@@ -76,13 +76,13 @@ pub fn compare(
     stages: &mut Stages<'_>,
 ) -> Result<CodecComparison, Error> {
     let raw_bytes = btf.raw_bytes();
-    let coded = to_coded_range(btf.clone());
+    let coded = to_coded_range(btf);
     let mut runs = Vec::new();
     for &codec in &options.codecs {
         let asked: Vec<Option<f64>> =
             if codec.has_sizes() { options.ratios.iter().copied().map(Some).collect() } else { vec![None] };
         for ratio in asked {
-            let (run, material) = run(&btf, &coded, codec, ratio, options, stages);
+            let (run, material) = run(&coded, codec, ratio, options, stages);
             if let (Some(report), Some(material)) = (report, &material) {
                 let picture = sheet(material, &coded, options.seed);
                 capture::write_rgb(&report.place(sheet_path(codec.name(), ratio))?, &picture)?;
@@ -111,7 +111,6 @@ pub(super) fn sheet_path(codec: &str, ratio: Option<f64>) -> PathBuf {
 }
 
 fn run(
-    btf: &Btf,
     coded: &Btf,
     codec: CodecKind,
     ratio: Option<f64>,
@@ -123,7 +122,7 @@ fn run(
     let started = Instant::now();
     let fitting = FitOptions { codec, budget, precision: options.precision, seed: options.seed };
     let stored = stages.run(&stage, |_| {
-        let (material, _) = fit(btf.clone(), &fitting).map_err(|fault| fault.to_string())?;
+        let (material, _) = fit(coded.clone(), &fitting).map_err(|fault| fault.to_string())?;
         let seconds = started.elapsed().as_secs_f64();
         let reread = Material::from_bytes(&material.to_bytes().0).map_err(|fault| fault.to_string())?;
         Ok::<_, String>((reread, seconds))

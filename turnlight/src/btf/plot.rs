@@ -2,7 +2,7 @@
 
 use super::{CodecComparison, Evaluation};
 use crate::Error;
-use plotters::coord::combinators::IntoLogRange;
+use plotters::coord::combinators::{BindKeyPoints, IntoLogRange};
 use plotters::prelude::*;
 
 /// Told apart by the colour-blind too (Okabe and Ito, 2008), then again with hollow marks.
@@ -25,7 +25,7 @@ pub(super) enum Axis {
     NanosecondsPerAnswer,
 }
 
-/// RMSE over an axis, both logarithmic, one curve per codec, as an SVG document.
+/// RMSE, from 0, over a logarithmic axis, marks of one colour per codec, as an SVG document.
 ///
 /// # Errors
 /// Where the plotting library fails.
@@ -41,6 +41,11 @@ impl Axis {
             Self::BytesPerTexel => Some(evaluation.bytes as f64 / texels as f64),
             Self::NanosecondsPerAnswer => evaluation.speed.map(|speed| 1e9 / speed.evals_per_s_core),
         }
+    }
+
+    /// Whether error follows from it: marks of one codec are then joined.
+    fn joins_sizes(self) -> bool {
+        matches!(self, Self::BytesPerTexel)
     }
 
     fn label(self) -> &'static str {
@@ -79,25 +84,43 @@ fn draw(comparison: &CodecComparison, axis: Axis, svg: &mut String) -> Result<()
         let (low, high) = values.fold((f64::MAX, f64::MIN), |(low, high), v| (low.min(v), high.max(v)));
         if low > high { 1.0..10.0 } else { low / 1.3..high * 1.3 }
     };
+    let along = range(|p| p.0);
     let root = SVGBackend::with_string(svg, (960, 420)).into_drawing_area();
     root.fill(&WHITE)?;
-    let mut chart = ChartBuilder::on(&root)
+    // Beside the plot, where the names cover no mark.
+    let (plot, names) = root.split_horizontally(820);
+    let mut chart = ChartBuilder::on(&plot)
         .margin(10)
         .x_label_area_size(36)
         .y_label_area_size(56)
-        .build_cartesian_2d(range(|p| p.0).log_scale(), range(|p| p.1).log_scale())?;
-    chart.configure_mesh().x_desc(axis.label()).y_desc("RMSE, levels of 255").draw()?;
+        .build_cartesian_2d(along.clone().log_scale().with_key_points(ticks(&along)), 0.0..range(|p| p.1).end)?;
+    let number = |value: &f64| format!("{}", (value * 1000.0).round() / 1000.0);
+    chart
+        .configure_mesh()
+        .x_desc(axis.label())
+        .y_desc("RMSE, levels of 255")
+        .x_label_formatter(&number)
+        .y_label_formatter(&number)
+        .draw()?;
     for (i, curve) in curves.iter().enumerate() {
         let color = COLORS[i % COLORS.len()];
         let style = if i < COLORS.len() { color.filled() } else { color.stroke_width(2) };
-        chart.draw_series(LineSeries::new(curve.points.iter().copied(), color.stroke_width(2)))?;
-        chart
-            .draw_series(curve.points.iter().map(|&p| Circle::new(p, 4, style)))?
-            .label(curve.name)
-            .legend(move |(x, y)| Circle::new((x + 8, y), 4, style));
+        if axis.joins_sizes() {
+            chart.draw_series(LineSeries::new(curve.points.iter().copied(), color.stroke_width(2)))?;
+        }
+        chart.draw_series(curve.points.iter().map(|&p| Circle::new(p, 4, style)))?;
+        let y = 24 + 20 * i as i32;
+        names.draw(&Circle::new((8, y), 4, style))?;
+        names.draw(&Text::new(curve.name, (20, y - 6), ("sans-serif", 13)))?;
     }
-    chart.configure_series_labels().background_style(WHITE.mix(0.8)).border_style(BLACK.mix(0.3)).draw()?;
     drop(chart);
     root.present()?;
     Ok(())
+}
+
+/// 1, 2 and 5 times powers of ten within a range.
+fn ticks(range: &std::ops::Range<f64>) -> Vec<f64> {
+    let (first, last) = (range.start.log10().floor() as i32, range.end.log10().ceil() as i32);
+    let steps = (first..=last).flat_map(|power| [1.0, 2.0, 5.0].map(|step| step * 10f64.powi(power)));
+    steps.filter(|tick| range.contains(tick)).collect()
 }

@@ -55,7 +55,7 @@ fn best_shape(grid: &Grid<'_>, pairs: &[u32], count: usize, options: &Options) -
     let error = |shape: &Shape| {
         let components = from_shape(grid, pairs, count, shape, &options).components;
         let refitted = refit::refitted(grid, components, training);
-        mean_square_error(grid, &Packed::new(&refitted), judging)
+        mean_square_error(grid, &Packed::new(&refitted, grid.periods), judging)
     };
     let judged = SHAPES.iter().map(|shape| (shape, error(shape)));
     judged.min_by(|a, b| a.1.total_cmp(&b.1)).map_or(&SHAPES[0], |best| best.0)
@@ -69,7 +69,7 @@ fn from_shape(grid: &Grid<'_>, pairs: &[u32], count: usize, shape: &Shape, optio
     for round in 0..options.rounds {
         let warming = share.filter(|_| options.warm_up.is_some_and(|warm| round < warm.rounds));
         let extent = Extent { pairs, share: warming.unwrap_or(1.0) };
-        let found = expect(grid, &Packed::new(&components), extent, options.reach);
+        let found = expect(grid, &Packed::new(&components, grid.periods), extent, options.reach);
         let likelihood = found.log_likelihood / found.samples;
         let before = log_likelihood.last().copied();
         log_likelihood.push(likelihood);
@@ -80,7 +80,7 @@ fn from_shape(grid: &Grid<'_>, pairs: &[u32], count: usize, shape: &Shape, optio
         if warming.is_none() && before.is_some_and(still) || round + 1 == options.rounds {
             break;
         }
-        reseeded += reseed(&mut components, found.samples, &spread, &FLOORS);
+        reseeded += reseed(grid, &mut components, found.samples, &spread, &FLOORS);
     }
     components.retain(|c| c.weight.ln() > LEAST_LOG_WEIGHT);
     Estimate { components, shape: *shape, log_likelihood, reseeded, evaluated: done / all }

@@ -155,6 +155,7 @@ fn add_shares<V: Vector>(
 ) {
     let mean = |v: usize| mixture.mean[v][component];
     let colour = [V::splat(mean(INPUTS)), V::splat(mean(INPUTS + 1)), V::splat(mean(INPUTS + 2))];
+    let [columns, rows] = mixture.periods;
     let mut column = V::splat(0.0);
     let (mut y1, mut y2) = (V::load(&sums[3]), V::load(&sums[4]));
     let mut c1 = [V::load(&sums[5]), V::load(&sums[6]), V::load(&sums[7])];
@@ -162,7 +163,7 @@ fn add_shares<V: Vector>(
     for row in 0..tile.rows {
         let q = V::load(&share[row]).times(V::load(&inverse[row]));
         column = column.plus(q);
-        let down = V::splat(tile.y[row] - mean(1));
+        let down = V::splat(rows.nearest_of(tile.y[row] - mean(1)));
         let first = q.times(down);
         y1 = y1.plus(first);
         y2 = first.times_plus(down, y2);
@@ -173,7 +174,7 @@ fn add_shares<V: Vector>(
             c2[c] = first.times_plus(d, c2[c]);
         }
     }
-    let across = V::load(&tile.x).minus(V::splat(mean(0)));
+    let across = columns.nearest(V::load(&tile.x).minus(V::splat(mean(0))));
     let first = column.times(across);
     column.plus(V::load(&sums[0])).store(&mut sums[0]);
     first.plus(V::load(&sums[1])).store(&mut sums[1]);

@@ -15,6 +15,9 @@ pub(super) type Row = [f32; LANES];
 /// denormal ones cost tens of times as much.
 const FLUSH: f32 = -60.0;
 
+/// 1.5 · 2²³: what it is added to is rounded to a whole number, which then stands in the lowest bits.
+const ROUNDING: f32 = 12_582_912.0;
+
 /// Sixteen numbers.
 pub(super) trait Vector: Copy {
     fn splat(value: f32) -> Self;
@@ -25,6 +28,8 @@ pub(super) trait Vector: Copy {
     fn times(self, other: Self) -> Self;
     /// `self · factor + term`.
     fn times_plus(self, factor: Self, term: Self) -> Self;
+    /// `self − d²`.
+    fn less_square(self, d: Self) -> Self;
     fn larger(self, other: Self) -> Self;
     /// Bit k is set where lane k is at least the limit's.
     fn at_least(self, limit: Self) -> u32;
@@ -33,18 +38,17 @@ pub(super) trait Vector: Copy {
     /// Times 2ⁿ, n in the lowest bits of `shifted`.
     fn times_two_to(self, shifted: Self) -> Self;
 
-    /// `self − d²`.
+    /// To whole numbers, ties to even; of what is below 2²².
     #[inline(always)]
-    fn less_square(self, d: Self) -> Self {
-        d.times_plus(Self::splat(0.0).minus(d), self)
+    fn rounded(self) -> Self {
+        self.plus(Self::splat(ROUNDING)).minus(Self::splat(ROUNDING))
     }
 
     /// `exp` of what is not positive, to 2 units in the last place; 0 below [`FLUSH`].
     /// Cody and Waite's reduction, the polynomial of Cephes' `expf`.
     #[inline(always)]
     fn exp(self) -> Self {
-        // Adding 1.5 · 2²³ rounds to a whole number, which then stands in the lowest bits.
-        let magic = Self::splat(12_582_912.0);
+        let magic = Self::splat(ROUNDING);
         let x = self.larger(Self::splat(FLUSH - 1.0));
         let shifted = x.times_plus(Self::splat(std::f32::consts::LOG2_E), magic);
         let n = shifted.minus(magic);
@@ -134,6 +138,11 @@ impl Vector for Plain {
     #[inline(always)]
     fn times_plus(self, factor: Self, term: Self) -> Self {
         self.times(factor).plus(term)
+    }
+
+    #[inline(always)]
+    fn less_square(self, d: Self) -> Self {
+        self.minus(d.times(d))
     }
 
     #[inline(always)]
@@ -227,6 +236,12 @@ mod x86 {
         }
 
         #[inline(always)]
+        fn less_square(self, d: Self) -> Self {
+            // SAFETY: see above.
+            Self(unsafe { _mm512_fnmadd_ps(d.0, d.0, self.0) })
+        }
+
+        #[inline(always)]
         fn larger(self, other: Self) -> Self {
             // SAFETY: see above.
             Self(unsafe { _mm512_max_ps(self.0, other.0) })
@@ -301,6 +316,12 @@ mod x86 {
         }
 
         #[inline(always)]
+        fn less_square(self, d: Self) -> Self {
+            // SAFETY: see above.
+            unsafe { Self(_mm256_fnmadd_ps(d.0, d.0, self.0), _mm256_fnmadd_ps(d.1, d.1, self.1)) }
+        }
+
+        #[inline(always)]
         fn larger(self, other: Self) -> Self {
             // SAFETY: see above.
             unsafe { Self(_mm256_max_ps(self.0, other.0), _mm256_max_ps(self.1, other.1)) }
@@ -351,7 +372,7 @@ mod x86 {
 /// A function that runs a generic kernel with the widest vectors of the machine. The kernel and all it calls
 /// must be `#[inline(always)]`, for only what is inlined is compiled for those instructions.
 macro_rules! kernel {
-    ($(#[$doc:meta])* fn $name:ident($($arg:ident: $type:ty),* $(,)?) $(-> $answer:ty)? = $generic:ident) => {
+    ($(#[$doc:meta])* fn $name:ident($($arg:ident: $type:ty),* $(,)?) $(-> $answer:ty)? = $generic:ident $(, $count:tt)?) => {
         $(#[$doc])*
         #[allow(unsafe_code, reason = "calls what needs instructions the machine was found to have")]
         pub(super) fn $name($($arg: $type),*) $(-> $answer)? {
@@ -359,11 +380,11 @@ macro_rules! kernel {
             {
                 #[target_feature(enable = "avx512f")]
                 fn wide($($arg: $type),*) $(-> $answer)? {
-                    $generic::<super::lanes::Avx512>($($arg),*)
+                    $generic::<super::lanes::Avx512 $(, $count)?>($($arg),*)
                 }
                 #[target_feature(enable = "avx2,fma")]
                 fn halves($($arg: $type),*) $(-> $answer)? {
-                    $generic::<super::lanes::Avx2>($($arg),*)
+                    $generic::<super::lanes::Avx2 $(, $count)?>($($arg),*)
                 }
                 if std::arch::is_x86_feature_detected!("avx512f") {
                     // SAFETY: the machine has AVX-512.
@@ -374,7 +395,7 @@ macro_rules! kernel {
                     return unsafe { halves($($arg),*) };
                 }
             }
-            $generic::<super::lanes::Plain>($($arg),*)
+            $generic::<super::lanes::Plain $(, $count)?>($($arg),*)
         }
     };
 }

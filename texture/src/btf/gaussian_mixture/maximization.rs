@@ -36,6 +36,7 @@ pub(super) fn maximise(
             (new.mean[2 + k], new.sigma[2 + k]) = moments(light, grid.lights.iter().map(|d| d[k]));
             (new.mean[4 + k], new.sigma[4 + k]) = moments(view, grid.views.iter().map(|d| d[k]));
         }
+        grid.periods.iter().zip(&mut new.mean).for_each(|(period, mean)| *mean = period.within(*mean));
         new.sigma.iter_mut().zip(floors).for_each(|(sigma, floor)| *sigma = sigma.max(*floor));
         new
     };
@@ -132,6 +133,7 @@ pub(super) fn spread(grid: &Grid<'_>, pairs: &[u32]) -> [f64; VARIABLES] {
 /// Puts each empty component on half of the component whose colours vary most in all: the two part along its widest
 /// input. Tells how many were empty.
 pub(super) fn reseed(
+    grid: &Grid<'_>,
     components: &mut [Component],
     samples: f64,
     spread: &[f64; VARIABLES],
@@ -154,6 +156,9 @@ pub(super) fn reseed(
         let mut other = half;
         half.mean[axis] -= step;
         other.mean[axis] += step;
+        for (half, period) in [&mut half, &mut other].into_iter().flat_map(|c| c.mean.iter_mut().zip(&grid.periods)) {
+            *half = period.within(*half);
+        }
         (components[source], components[target]) = (half, other);
     }
     let total: f64 = components.iter().map(|c| c.weight).sum();

@@ -6,7 +6,7 @@
 //! out, which changes no sum by more than `M · exp(−reach)` of itself.
 
 use super::lanes::{LANES, Row, Vector};
-use super::variables::{INPUTS, VARIABLES};
+use super::variables::{INPUTS, Period, VARIABLES};
 use crate::btf::MixtureComponent;
 use std::f64::consts::{FRAC_1_SQRT_2, TAU};
 
@@ -36,6 +36,8 @@ pub(super) struct Component {
 pub(super) struct Packed {
     /// Components without padding.
     pub(super) count: usize,
+    /// Of x and y.
+    pub(super) periods: [Period; 2],
     /// Per variable.
     pub(super) mean: [Vec<f32>; VARIABLES],
     /// √½ / σ: the square of a scaled difference is the exponent.
@@ -80,7 +82,7 @@ pub(super) struct Likely {
 
 impl Packed {
     /// In `f32`, ready to be evaluated.
-    pub(super) fn new(components: &[Component]) -> Self {
+    pub(super) fn new(components: &[Component], periods: [Period; 2]) -> Self {
         let padding = components.len().next_multiple_of(LANES) - components.len();
         let padded = |value: &dyn Fn(&Component) -> f64, pad: f32| -> Vec<f32> {
             components.iter().map(|c| value(c) as f32).chain(std::iter::repeat_n(pad, padding)).collect()
@@ -90,6 +92,7 @@ impl Packed {
         };
         Self {
             count: components.len(),
+            periods,
             mean: std::array::from_fn(|v| padded(&|c| c.mean[v], 0.0)),
             scale: std::array::from_fn(|v| padded(&|c| FRAC_1_SQRT_2 / c.sigma[v], 0.0)),
             joint: padded(&|c| logarithm(c, VARIABLES), NEVER),
@@ -204,12 +207,13 @@ impl Likely {
         self.bound.extend_from_slice(energy);
         let bounds = self.bound.as_chunks_mut::<LANES>().0;
         for (variable, low, high) in tile.intervals(evidence) {
+            let period = mixture.periods.get(variable).copied().unwrap_or_default();
             let means = mixture.mean[variable].as_chunks::<LANES>().0;
             let scales = mixture.scale[variable].as_chunks::<LANES>().0;
-            let (low, high, nothing) = (V::splat(low), V::splat(high), V::splat(0.0));
+            let (middle, half, nothing) = (V::splat(0.5 * (low + high)), V::splat(0.5 * (high - low)), V::splat(0.0));
             for g in 0..bounds.len() {
-                let mean = V::load(&means[g]);
-                let outside = low.minus(mean).larger(mean.minus(high)).larger(nothing);
+                let off = period.nearest(V::load(&means[g]).minus(middle));
+                let outside = off.larger(nothing.minus(off)).minus(half).larger(nothing);
                 V::load(&bounds[g]).less_square(outside.times(V::load(&scales[g]))).store(&mut bounds[g]);
             }
         }
@@ -260,10 +264,11 @@ impl Likely {
         let out = &mut self.shares[self.list.len()];
         self.list.push(component as u32);
         let (mean, scale) = (|v: usize| mixture.mean[v][component], |v: usize| mixture.scale[v][component]);
-        let across = V::load(&tile.x).minus(V::splat(mean(0))).times(V::splat(scale(0)));
+        let [columns, rows] = mixture.periods;
+        let across = columns.nearest(V::load(&tile.x).minus(V::splat(mean(0)))).times(V::splat(scale(0)));
         let base = V::splat(energy).less_square(across);
         for row in 0..tile.rows {
-            base.less_square(V::splat((tile.y[row] - mean(1)) * scale(1))).store(&mut out[row]);
+            base.less_square(V::splat(rows.nearest_of(tile.y[row] - mean(1)) * scale(1))).store(&mut out[row]);
         }
         if evidence {
             let means = [6, 7, 8].map(|v| V::splat(mean(v)));

@@ -22,9 +22,12 @@
 //! which take 4 % of the samples; in memory M × (lights + views) sums for each of 32 parts and M² for the refit.
 //! An answer: M densities of six variables, sixteen at a time; those of light and eye once for texels asked for together.
 //!
+//! **Tiles** that continue themselves are coded so: along an axis where texels differ no more across the border than
+//! somewhere within, the difference of a place from a mean is that to the nearest of the mean's images, in the fit as in
+//! answers. Components wider than a third of the tile lose what would reach around it ([`variables::Period`]).
+//!
 //! **Limits**: structures and highlights sharper than the components are wide are blurred, and of a tile whose
-//! texels hardly resemble their neighbours little more than the mean picture is left; the tile does not continue
-//! across its border. What has no variation (one texel, one light, constant colour) puts deviations on their floors and changes no
+//! texels hardly resemble their neighbours little more than the mean picture is left. What has no variation (one texel, one light, constant colour) puts deviations on their floors and changes no
 //! answer. More components than samples are not made. Samples that are not finite, or far outside 0 to 1, are
 //! refused. Under a direction that is no direction, the answer is that for the normal.
 //!
@@ -52,7 +55,8 @@ use capture::btf::Btf;
 use estimation::{Estimate, estimate};
 use mixture::{Component, Packed};
 use nalgebra::Vector3;
-use variables::{FLOORS, Grid, onion_slice};
+use prediction::Exponents;
+use variables::{FLOORS, Grid, Period, onion_slice};
 
 /// Samples beyond this were not encoded.
 const LARGEST_SAMPLE: f32 = 100.0;
@@ -97,6 +101,7 @@ pub struct GaussianMixture {
     components: Vec<Component>,
     /// The components, ready to be evaluated.
     packed: Box<Packed>,
+    exponents: Exponents,
 }
 
 impl Options {
@@ -135,13 +140,16 @@ pub fn fit(btf: &Btf, options: &Options) -> Result<(GaussianMixture, FitReport),
     });
     let found = estimate(&grid, &pairs, count, options);
     describe(&found, count, options, &mut notes);
+    for (axis, _) in ["x", "y"].iter().zip(grid.periods).filter(|(_, period)| period.length > 0.0) {
+        notes.push(format!("the tile continues itself along {axis}"));
+    }
     let mut components: Vec<Component> =
         found.components.iter().map(|c| storage::rounded(c, options.precision, &frame)).collect();
     if options.refit {
         components = refit::refitted(&grid, components, &pairs);
         components.iter_mut().for_each(|c| *c = storage::rounded(c, options.precision, &frame));
     }
-    let codec = GaussianMixture::new(frame, options.precision, grid.mean, components);
+    let codec = GaussianMixture::new(frame, options.precision, grid.periods, grid.mean, components);
     Ok((codec, FitReport { objective: found.log_likelihood, notes }))
 }
 
@@ -195,10 +203,17 @@ fn describe(found: &Estimate, asked: usize, options: &Options, notes: &mut Vec<S
 
 impl GaussianMixture {
     /// Components are put into the order of their places: of sixteen side by side, all or none then matter to a texel.
-    fn new(frame: Frame, precision: Precision, mean: Vec<u8>, mut components: Vec<Component>) -> Self {
+    fn new(
+        frame: Frame,
+        precision: Precision,
+        periods: [Period; 2],
+        mean: Vec<u8>,
+        mut components: Vec<Component>,
+    ) -> Self {
         components.sort_by_key(|c| place_on_curve(c, &frame));
-        let packed = Box::new(Packed::new(&components));
-        Self { frame, precision, mean, components, packed }
+        let packed = Box::new(Packed::new(&components, periods));
+        let exponents = Exponents::of([frame.width, frame.height]);
+        Self { frame, precision, mean, components, packed, exponents }
     }
 
     /// M.
@@ -251,12 +266,19 @@ impl Sampler for GaussianMixture {
 
     fn values(&self, texels: &[usize], light: &Vector3<f32>, view: &Vector3<f32>, out: &mut [[f32; 3]]) {
         let (angles, mean) = (angles(light, view), self.mean_colour(light, view));
-        let place = |texel: usize| [texel % self.frame.width, texel / self.frame.width].map(|v| v as f32 + 0.5);
+        let width = self.frame.width;
+        let place = |texel: usize| self.exponents.at(&self.packed, [texel % width, texel / width]);
         for (texels, out) in texels.chunks(prediction::FEW).zip(out.chunks_mut(prediction::FEW)) {
-            let mut places = [[0.0; 2]; prediction::FEW];
-            places.iter_mut().zip(texels).for_each(|(to, &texel)| *to = place(texel));
-            prediction::few(&self.packed, angles, &places[..texels.len()], out);
-            out.iter_mut().zip(texels).for_each(|(out, _)| (0..3).for_each(|c| out[c] += mean[c]));
+            let found = match *texels {
+                [texel] => [prediction::one(&self.packed, angles, &[place(texel)])[0]; prediction::FEW],
+                _ => {
+                    let places = std::array::from_fn(|k| place(texels[k.min(texels.len() - 1)]));
+                    prediction::few(&self.packed, angles, &places)
+                }
+            };
+            for ((out, found), _) in out.iter_mut().zip(found).zip(texels) {
+                *out = [0, 1, 2].map(|c| mean[c] + found[c]);
+            }
         }
     }
 
@@ -271,6 +293,7 @@ impl Sampler for GaussianMixture {
     fn tables(&self) -> Option<Tables> {
         let components = (0..self.packed.count).map(|m| self.packed.component(m)).collect();
         let mean = self.mean.as_chunks::<3>().0.iter().map(|m| m.map(|c| f32::from(c) / 255.0)).collect();
-        Some(Tables::GaussianMixture(MixtureTables { components, mean }))
+        let periods = self.packed.periods.map(|period| period.length);
+        Some(Tables::GaussianMixture(MixtureTables { components, periods, mean }))
     }
 }

@@ -8,14 +8,15 @@ use super::lanes::{LANES, Row, Vector, kernel};
 use super::mixture::{Likely, Packed, Tile};
 use super::variables::{Grid, INPUTS};
 use rayon::prelude::*;
+use std::sync::OnceLock;
 
 /// Components further below the best than this change an answer by less than the rounding of `f32`.
 pub(super) const REACH: f32 = 18.0;
 
-/// Vectors of logarithms kept at a time.
-const BLOCK: usize = 64;
+/// Vectors of components whose logarithms are kept at a time: 640 components.
+const BLOCK: usize = 40;
 
-/// Places asked for at once: four of bilinear interpolation, sixteen of a wider footprint.
+/// Places asked for at once: those of bilinear interpolation; a wider footprint has up to sixteen.
 pub(super) const FEW: usize = 4;
 
 /// Colours less the mean over a grid of texels, (y, x, channel), α and s of light and view given.
@@ -68,116 +69,181 @@ fn mixed<V: Vector>(mixture: &Packed, likely: &Likely, row: usize) -> [Row; 3] {
     colours
 }
 
+/// Exponents of x and of y at a place, per component.
+pub(super) type Place<'a> = [&'a [Row]; 2];
+
+/// Exponents of an axis, `((place − mean) · scale)²`, per component.
+pub(super) fn exponents(mixture: &Packed, axis: usize, place: f32) -> Vec<Row> {
+    let [means, scales] = [&mixture.mean, &mixture.scale].map(|all| all[axis].as_chunks::<LANES>().0);
+    let exponent = |mean: f32, scale: f32| (mixture.periods[axis].nearest_of(place - mean) * scale).powi(2);
+    let row = |(mean, scale): (&Row, &Row)| std::array::from_fn(|k| exponent(mean[k], scale[k]));
+    means.iter().zip(scales).map(row).collect()
+}
+
+/// Exponents of each column and row of a tile, found when they are first asked for: at most 4 bytes for each component
+/// and each of them.
+#[derive(Clone, Debug)]
+pub(super) struct Exponents {
+    along: [Vec<OnceLock<Vec<Row>>>; 2],
+}
+
+impl Exponents {
+    /// Of a tile of `size` (columns, rows) texels.
+    pub(super) fn of(size: [usize; 2]) -> Self {
+        Self { along: size.map(|side| vec![OnceLock::new(); side]) }
+    }
+
+    /// Of the middle of the texel in a column and row.
+    pub(super) fn at(&self, mixture: &Packed, texel: [usize; 2]) -> Place<'_> {
+        [0, 1].map(|axis| {
+            let found = &self.along[axis][texel[axis]];
+            found.get_or_init(|| exponents(mixture, axis, texel[axis] as f32 + 0.5)).as_slice()
+        })
+    }
+}
+
+/// What follows from components and size makes no codec another one.
+impl PartialEq for Exponents {
+    fn eq(&self, _: &Self) -> bool {
+        true
+    }
+}
+
 kernel! {
-    /// Colours less the mean of up to [`FEW`] places under one light and view: one of `out` for each of `places`, as long
-    /// as both last.
-    fn few(mixture: &Packed, angles: [f32; 4], places: &[[f32; 2]], out: &mut [[f32; 3]]) = few_with
+    /// Colours less the mean of a place under one light and view.
+    fn one(mixture: &Packed, angles: [f32; 4], places: &[Place<'_>; 1]) -> [[f32; 3]; 1] = together, 1
+}
+
+kernel! {
+    /// The same of some places: a vector of components is loaded once for all, and left out where it matters to none.
+    fn few(mixture: &Packed, angles: [f32; 4], places: &[Place<'_>; FEW]) -> [[f32; 3]; FEW] = together, FEW
 }
 
 #[inline(always)]
-pub(super) fn few_with<V: Vector>(mixture: &Packed, angles: [f32; 4], places: &[[f32; 2]], out: &mut [[f32; 3]]) {
-    let (mut energies, mut logs) = ([[0.0; LANES]; BLOCK], [[0.0; LANES]; BLOCK]);
-    let mut answers = [Answer::<V>::none(); FEW];
+pub(super) fn together<V: Vector, const N: usize>(
+    mixture: &Packed,
+    angles: [f32; 4],
+    places: &[Place<'_>; N],
+) -> [[f32; 3]; N] {
+    let mut logs = [[[0.0; LANES]; N]; BLOCK];
+    let mut sums = Sums::<V, N>::none();
     let vectors = mixture.input.len() / LANES;
     for first in (0..vectors).step_by(BLOCK) {
-        let block = first..vectors.min(first + BLOCK);
-        let (energies, logs) = (&mut energies[..block.len()], &mut logs[..block.len()]);
-        angular::<V>(mixture, angles, first, energies);
-        for (answer, &place) in answers.iter_mut().zip(places) {
-            let top = at_place::<V>(mixture, energies, place, first, logs);
-            answer.take(mixture, logs, top, first);
-        }
+        let logs = &mut logs[..BLOCK.min(vectors - first)];
+        let tops = log_densities::<V, N>(mixture, angles, places, first, logs);
+        sums.take(mixture, logs, tops, first);
     }
-    for ((out, answer), _) in out.iter_mut().zip(&answers).zip(places) {
-        *out = answer.colour();
-    }
+    sums.colours()
 }
 
-/// `ln w − Σ ln σ − ½ Σ z²` over the angles, of the vectors of components from `first` on.
+/// Log densities of all inputs, of the vectors of components from `first` on; the largest of each place.
 #[inline(always)]
-fn angular<V: Vector>(mixture: &Packed, angles: [f32; 4], first: usize, out: &mut [Row]) {
+fn log_densities<V: Vector, const N: usize>(
+    mixture: &Packed,
+    angles: [f32; 4],
+    places: &[Place<'_>; N],
+    first: usize,
+    out: &mut [[Row; N]],
+) -> [f32; N] {
     let count = out.len();
-    out.copy_from_slice(&mixture.input.as_chunks::<LANES>().0[first..][..count]);
-    for (v, angle) in angles.into_iter().enumerate() {
-        let (means, scales) = of_block(mixture, 2 + v, first, count);
-        for ((out, mean), scale) in out.iter_mut().zip(means).zip(scales) {
-            V::load(out).less_square(V::splat(angle).minus(V::load(mean)).times(V::load(scale))).store(out);
+    let bias = of_block(&mixture.input, first, count);
+    let mean = [2, 3, 4, 5].map(|v| of_block(&mixture.mean[v], first, count));
+    let scale = [2, 3, 4, 5].map(|v| of_block(&mixture.scale[v], first, count));
+    let mut tops = [V::splat(f32::NEG_INFINITY); N];
+    for (g, out) in out.iter_mut().enumerate() {
+        let mut energy = V::load(&bias[g]);
+        for (v, angle) in angles.into_iter().enumerate() {
+            let off = V::splat(angle).minus(V::load(&mean[v][g]));
+            energy = energy.less_square(off.times(V::load(&scale[v][g])));
+        }
+        for p in 0..N {
+            let [across, down] = places[p].map(|squares| &squares[first + g]);
+            let log = energy.minus(V::load(across)).minus(V::load(down));
+            log.store(&mut out[p]);
+            tops[p] = tops[p].larger(log);
         }
     }
-}
-
-/// Log densities of all inputs where `energies` has what the angles say; the largest.
-#[inline(always)]
-fn at_place<V: Vector>(mixture: &Packed, energies: &[Row], place: [f32; 2], first: usize, out: &mut [Row]) -> f32 {
-    let [x, y] = place.map(V::splat);
-    let [(mean_x, scale_x), (mean_y, scale_y)] = [0, 1].map(|v| of_block(mixture, v, first, energies.len()));
-    let mut top = V::splat(f32::NEG_INFINITY);
-    for (g, (out, energy)) in out.iter_mut().zip(energies).enumerate() {
-        let across = x.minus(V::load(&mean_x[g])).times(V::load(&scale_x[g]));
-        let down = y.minus(V::load(&mean_y[g])).times(V::load(&scale_y[g]));
-        let log = V::load(energy).less_square(across).less_square(down);
-        log.store(out);
-        top = top.larger(log);
+    let mut largest = [0.0; N];
+    for p in 0..N {
+        largest[p] = tops[p].largest();
     }
-    top.largest()
+    largest
 }
 
-/// Means and scales of a variable, of `count` vectors of components from `first` on.
-fn of_block(mixture: &Packed, variable: usize, first: usize, count: usize) -> (&[Row], &[Row]) {
-    let [means, scales] = [&mixture.mean, &mixture.scale].map(|all| all[variable].as_chunks::<LANES>().0);
-    (&means[first..][..count], &scales[first..][..count])
+/// `count` vectors from `first` on.
+fn of_block(all: &[f32], first: usize, count: usize) -> &[Row] {
+    &all.as_chunks().0[first..][..count]
 }
 
-/// Sums over components as far as they were looked at.
-#[derive(Clone, Copy)]
-struct Answer<V> {
+/// Sums over components as far as they were looked at, per place.
+///
+/// Loops, not closures, for those would not be compiled into the kernel.
+struct Sums<V, const N: usize> {
     /// The largest logarithm so far: all sums are over its exponential.
-    best: f32,
+    best: [f32; N],
     /// Of shares times red, green, blue, and of shares.
-    sums: [V; 4],
+    of: [[V; 4]; N],
 }
 
-impl<V: Vector> Answer<V> {
+impl<V: Vector, const N: usize> Sums<V, N> {
     #[inline(always)]
     fn none() -> Self {
-        Self { best: f32::NEG_INFINITY, sums: [V::splat(0.0); 4] }
+        Self { best: [f32::NEG_INFINITY; N], of: [[V::splat(0.0); 4]; N] }
     }
 
-    /// Takes the vectors of components from `first` on in, of logarithms up to `top`.
+    /// Takes the vectors of components from `first` on in, of logarithms up to `tops`.
     #[inline(always)]
-    fn take(&mut self, mixture: &Packed, logs: &[Row], top: f32, first: usize) {
-        self.raise(top);
-        let colours = [0, 1, 2].map(|c| &mixture.mean[INPUTS + c].as_chunks::<LANES>().0[first..][..logs.len()]);
+    fn take(&mut self, mixture: &Packed, logs: &[[Row; N]], tops: [f32; N], first: usize) {
+        self.raise(tops);
+        let colours = [0, 1, 2].map(|c| of_block(&mixture.mean[INPUTS + c], first, logs.len()));
+        let reach = V::splat(-REACH);
         // In registers, not behind a reference.
-        let mut sums = self.sums;
-        for (g, log) in logs.iter().enumerate() {
-            let log = V::load(log).minus(V::splat(self.best));
-            if log.at_least(V::splat(-REACH)) == 0 {
+        let mut sums = self.of;
+        for (g, logs) in logs.iter().enumerate() {
+            let (mut below, mut nearest) = ([reach; N], V::splat(f32::NEG_INFINITY));
+            for p in 0..N {
+                below[p] = V::load(&logs[p]).minus(V::splat(self.best[p]));
+                nearest = nearest.larger(below[p]);
+            }
+            if nearest.at_least(reach) == 0 {
                 continue;
             }
-            let share = log.exp();
-            sums[3] = sums[3].plus(share);
-            for c in 0..3 {
-                sums[c] = share.times_plus(V::load(&colours[c][g]), sums[c]);
+            for p in 0..N {
+                // Nothing where it does not matter to this place: answers do not depend on what is asked for with it.
+                let share = below[p].exp().where_at_least(below[p], reach);
+                sums[p][3] = sums[p][3].plus(share);
+                for c in 0..3 {
+                    sums[p][c] = share.times_plus(V::load(&colours[c][g]), sums[p][c]);
+                }
             }
         }
-        self.sums = sums;
+        self.of = sums;
     }
 
-    /// Sums over the exponential of a larger logarithm.
+    /// Sums over the exponentials of larger logarithms.
     #[inline(always)]
-    fn raise(&mut self, top: f32) {
-        if top > self.best {
-            let factor = V::splat(if self.best == f32::NEG_INFINITY { 0.0 } else { (self.best - top).exp() });
-            self.sums = self.sums.map(|sum| sum.times(factor));
-            self.best = top;
+    fn raise(&mut self, tops: [f32; N]) {
+        for ((best, sums), top) in self.best.iter_mut().zip(&mut self.of).zip(tops) {
+            if top > *best {
+                let factor = V::splat(if *best == f32::NEG_INFINITY { 0.0 } else { (*best - top).exp() });
+                for sum in sums {
+                    *sum = sum.times(factor);
+                }
+                *best = top;
+            }
         }
     }
 
     #[inline(always)]
-    fn colour(&self) -> [f32; 3] {
-        let total = self.sums[3].sum();
-        [0, 1, 2].map(|c| self.sums[c].sum() / total)
+    fn colours(&self) -> [[f32; 3]; N] {
+        let mut colours = [[0.0; 3]; N];
+        for (colour, sums) in colours.iter_mut().zip(&self.of) {
+            let total = sums[3].sum();
+            for c in 0..3 {
+                colour[c] = sums[c].sum() / total;
+            }
+        }
+        colours
     }
 }
 

@@ -216,7 +216,7 @@ impl BySample {
 
 /// The components with colours refitted to the pictures of `pairs`.
 pub(super) fn refitted(grid: &Grid<'_>, mut components: Vec<Component>, pairs: &[u32]) -> Vec<Component> {
-    let normal = Normal::of(grid, &Packed::new(&components), pairs);
+    let normal = Normal::of(grid, &Packed::new(&components, grid.periods), pairs);
     for variable in INPUTS..VARIABLES {
         let guess: Vec<f64> = components.iter().map(|c| c.mean[variable]).collect();
         let solved = normal.solve(variable - INPUTS, &guess);

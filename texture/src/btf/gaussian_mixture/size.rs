@@ -88,7 +88,7 @@ pub(super) fn supported(grid: &Grid<'_>, pairs: &[u32], options: &Options) -> (u
     for count in LADDER.into_iter().filter(|&count| count == 1 || 20 * count <= samples) {
         let components = estimate(grid, &training, count, &trial).components;
         let refitted = refit::refitted(grid, components, &training);
-        let error = mean_square_error(grid, &Packed::new(&refitted), &judging).sqrt();
+        let error = mean_square_error(grid, &Packed::new(&refitted, grid.periods), &judging).sqrt();
         tried.push(format!("{count}: {:.3}", 255.0 * error));
         if error > best.1 * (1.0 - WORTHWHILE) || best.1 < ENOUGH {
             break;

@@ -1,7 +1,7 @@
 //! What a file holds.
 //!
 //! ```text
-//! u8     0 full, 1 compact
+//! u8     1 compact, else full; plus 2 and 4 where the tile continues itself along x and y
 //! u32    M
 //! mean   (view, light, channel): u8, 255 stands for 1
 //! full   M × (f32 weight, f32 × 9 means, f32 × 9 deviations)
@@ -14,7 +14,7 @@
 use super::GaussianMixture;
 use super::mixture::Component;
 use super::refit::LARGEST_COLOUR;
-use super::variables::{INPUTS, VARIABLES};
+use super::variables::{INPUTS, Period, VARIABLES};
 use crate::btf::container::{Fault, Reader, Stored, Writer};
 use crate::btf::{Frame, Precision};
 use std::f64::consts::FRAC_PI_2;
@@ -142,7 +142,8 @@ fn from_codes((weight, means, sigmas, colours): &Codes, frame: &Frame) -> Compon
 impl Stored for GaussianMixture {
     fn write(&self, out: &mut Writer) {
         out.part("mean picture");
-        out.u8(u8::from(self.precision == Precision::Compact));
+        let [x, y] = self.packed.periods.map(|period| u8::from(period.length > 0.0));
+        out.u8(u8::from(self.precision == Precision::Compact) + 2 * x + 4 * y);
         out.u32(self.components.len() as u32);
         out.bytes(&self.mean);
         out.part("components");
@@ -164,11 +165,14 @@ impl Stored for GaussianMixture {
     }
 
     fn read(from: &mut Reader<'_>, frame: Frame) -> Result<Self, Fault> {
-        let precision = match from.u8()? {
-            0 => Precision::Full,
-            1 => Precision::Compact,
+        let how = from.u8()?;
+        let precision = match how {
+            0..8 if how & 1 == 1 => Precision::Compact,
+            0..8 => Precision::Full,
             other => return Err(Fault(format!("precision {other} is unknown"))),
         };
+        let period = |bit: u8, side: usize| if how & bit != 0 { Period::of(side) } else { Period::default() };
+        let periods = [period(2, frame.width), period(4, frame.height)];
         let count = from.u32()? as usize;
         let mean = from.take(3 * frame.pairs())?.to_vec();
         from.expect(count, component_bytes(precision))?;
@@ -180,7 +184,7 @@ impl Stored for GaussianMixture {
             Precision::Compact => read_compact(from, &frame),
         };
         let components = (0..count).map(read).collect::<Result<Vec<_>, _>>()?;
-        Ok(Self::new(frame, precision, mean, components))
+        Ok(Self::new(frame, precision, periods, mean, components))
     }
 }
 

@@ -104,9 +104,20 @@ fn all_pairs(btf: &Btf) -> Vec<u32> {
 }
 
 /// One round of EM as it is written, sample by sample; mean log-likelihood before it.
-fn plain_round(samples: &[[f64; VARIABLES]], old: &[Component], floors: &[f64; VARIABLES]) -> (f64, Vec<Component>) {
+fn plain_round(
+    samples: &[[f64; VARIABLES]],
+    periods: [Period; 2],
+    old: &[Component],
+    floors: &[f64; VARIABLES],
+) -> (f64, Vec<Component>) {
+    // From a mean, where it is nearest.
+    let off = |v: usize, from: f64, at: &[f64; VARIABLES]| {
+        let length = periods.get(v).map_or(0.0, |period| f64::from(period.length));
+        let images = [0.0, -length, length].map(|shift| at[v] - from + shift);
+        images.into_iter().min_by(|a, b| a.abs().total_cmp(&b.abs())).unwrap()
+    };
     let log_density = |c: &Component, at: &[f64; VARIABLES]| {
-        let of = |v: usize| -0.5 * ((at[v] - c.mean[v]) / c.sigma[v]).powi(2) - (c.sigma[v] * TAU.sqrt()).ln();
+        let of = |v: usize| -0.5 * (off(v, c.mean[v], at) / c.sigma[v]).powi(2) - (c.sigma[v] * TAU.sqrt()).ln();
         c.weight.ln() + (0..VARIABLES).map(of).sum::<f64>()
     };
     let (mut likelihood, mut shares) = (0.0, vec![Vec::new(); old.len()]);
@@ -117,16 +128,20 @@ fn plain_round(samples: &[[f64; VARIABLES]], old: &[Component], floors: &[f64; V
         likelihood += best + total.ln();
         logs.iter().zip(&mut shares).for_each(|(l, shares)| shares.push((l - best).exp() / total));
     }
-    let new = |shares: &Vec<f64>| {
+    let new = |(old, shares): (&Component, &Vec<f64>)| {
         let sum: f64 = shares.iter().sum();
         let mean_of = |f: &dyn Fn(&[f64; VARIABLES]) -> f64| {
             shares.iter().zip(samples).map(|(q, at)| q * f(at)).sum::<f64>() / sum
         };
-        let mean: [f64; VARIABLES] = std::array::from_fn(|v| mean_of(&|at| at[v]));
-        let sigma = |v: usize| mean_of(&|at| (at[v] - mean[v]).powi(2)).sqrt().max(floors[v]);
+        let shift: [f64; VARIABLES] = std::array::from_fn(|v| mean_of(&|at| off(v, old.mean[v], at)));
+        let sigma = |v: usize| mean_of(&|at| (off(v, old.mean[v], at) - shift[v]).powi(2)).sqrt().max(floors[v]);
+        let mean = std::array::from_fn(|v| {
+            let moved = old.mean[v] + shift[v];
+            periods.get(v).map_or(moved, |period| period.within(moved))
+        });
         Component { weight: sum / samples.len() as f64, mean, sigma: std::array::from_fn(sigma) }
     };
-    (likelihood / samples.len() as f64, shares.iter().map(new).collect())
+    (likelihood / samples.len() as f64, old.iter().zip(&shares).map(new).collect())
 }
 
 fn all_samples(grid: &Grid<'_>, pairs: &[u32]) -> Vec<[f64; VARIABLES]> {
@@ -139,6 +154,7 @@ fn four_numbers() -> (Grid<'static>, Vec<Component>, [f64; VARIABLES]) {
     let grid = Grid {
         x: vec![0.0, 1.0, 9.0, 10.0],
         y: vec![0.0],
+        periods: Default::default(),
         lights: vec![[0.0; 2]],
         views: vec![[0.0; 2]],
         mean: vec![0; 3],
@@ -185,11 +201,11 @@ fn directions_are_cut_with_their_sign() {
 fn one_round_on_four_numbers_is_the_known_one() {
     let (grid, start, floors) = four_numbers();
     let samples = all_samples(&grid, &[0]);
-    let (plain_before, plain) = plain_round(&samples, &start, &floors);
-    let (plain_after, _) = plain_round(&samples, &plain, &floors);
-    let found = expect(&grid, &Packed::new(&start), all(&[0]), ALL);
+    let (plain_before, plain) = plain_round(&samples, grid.periods, &start, &floors);
+    let (plain_after, _) = plain_round(&samples, grid.periods, &plain, &floors);
+    let found = expect(&grid, &Packed::new(&start, grid.periods), all(&[0]), ALL);
     let fast = maximise(&grid, &start, &found, &floors);
-    let after = likelihood(&expect(&grid, &Packed::new(&fast), all(&[0]), ALL));
+    let after = likelihood(&expect(&grid, &Packed::new(&fast, grid.periods), all(&[0]), ALL));
     for (before, after, new) in [(plain_before, plain_after, plain), (likelihood(&found), after, fast)] {
         assert!((before + 1.862_085_7).abs() < 1e-6 && (after + 1.418_938_5).abs() < 1e-6, "{before} {after}");
         for (component, mean) in new.iter().zip([0.5, 9.5]) {
@@ -206,9 +222,9 @@ fn the_fast_round_is_the_plain_one() {
     let samples = all_samples(&grid, &pairs);
     let mut components = start(&grid, &pairs, 7, &SHAPES[0], &FLOORS, 3);
     for _ in 0..4 {
-        let found = expect(&grid, &Packed::new(&components), all(&pairs), ALL);
+        let found = expect(&grid, &Packed::new(&components, grid.periods), all(&pairs), ALL);
         let fast = maximise(&grid, &components, &found, &FLOORS);
-        let (expected, plain) = plain_round(&samples, &components, &FLOORS);
+        let (expected, plain) = plain_round(&samples, grid.periods, &components, &FLOORS);
         assert!((likelihood(&found) - expected).abs() < 1e-5, "{} {expected}", likelihood(&found));
         for (a, b) in fast.iter().zip(&plain) {
             assert!((a.weight - b.weight).abs() < 1e-5 * b.weight);
@@ -230,12 +246,13 @@ fn leaving_components_out_costs_less_than_a_thousandth_of_the_likelihood() {
     let mut plain = fast.clone();
     let mut evaluations = 0.0;
     for _ in 0..12 {
-        let found = expect(&grid, &Packed::new(&fast), all(&pairs), 14.0);
+        let found = expect(&grid, &Packed::new(&fast, grid.periods), all(&pairs), 14.0);
         evaluations = found.evaluations / found.samples;
         fast = maximise(&grid, &fast, &found, &FLOORS);
-        plain = plain_round(&samples, &plain, &FLOORS).1;
+        plain = plain_round(&samples, grid.periods, &plain, &FLOORS).1;
     }
-    let (ours, theirs) = (plain_round(&samples, &fast, &FLOORS).0, plain_round(&samples, &plain, &FLOORS).0);
+    let (ours, theirs) =
+        (plain_round(&samples, grid.periods, &fast, &FLOORS).0, plain_round(&samples, grid.periods, &plain, &FLOORS).0);
     assert!((ours - theirs).abs() < 1e-3 * theirs.abs(), "{ours} {theirs}");
     assert!(evaluations < 36.0, "{evaluations} of 40 were evaluated");
 }
@@ -255,13 +272,14 @@ fn on_a_tile_the_likelihood_is_that_of_plain_em() {
     let samples = all_samples(&grid, &pairs);
     let mut fast = start(&grid, &pairs, 60, &SHAPES[0], &FLOORS, 3);
     let mut plain = fast.clone();
-    let before = plain_round(&samples, &plain, &FLOORS).0;
+    let before = plain_round(&samples, grid.periods, &plain, &FLOORS).0;
     for _ in 0..20 {
-        let found = expect(&grid, &Packed::new(&fast), all(&pairs), 14.0);
+        let found = expect(&grid, &Packed::new(&fast, grid.periods), all(&pairs), 14.0);
         fast = maximise(&grid, &fast, &found, &FLOORS);
-        plain = plain_round(&samples, &plain, &FLOORS).1;
+        plain = plain_round(&samples, grid.periods, &plain, &FLOORS).1;
     }
-    let (ours, theirs) = (plain_round(&samples, &fast, &FLOORS).0, plain_round(&samples, &plain, &FLOORS).0);
+    let (ours, theirs) =
+        (plain_round(&samples, grid.periods, &fast, &FLOORS).0, plain_round(&samples, grid.periods, &plain, &FLOORS).0);
     // Units shift a likelihood: what counts is how far it has risen.
     let risen = theirs - before;
     println!("a sample's log-likelihood rose by {risen}, plain; by {} less", theirs - ours);
@@ -277,7 +295,7 @@ fn the_likelihood_never_falls() {
     let mut components = start(&grid, &pairs, 5, &SHAPES[0], &floors, 1);
     let mut before = f64::NEG_INFINITY;
     for _ in 0..10 {
-        let found = expect(&grid, &Packed::new(&components), all(&pairs), ALL);
+        let found = expect(&grid, &Packed::new(&components, grid.periods), all(&pairs), ALL);
         assert!(likelihood(&found) >= before - 1e-6, "{before} {}", likelihood(&found));
         before = likelihood(&found);
         components = maximise(&grid, &components, &found, &floors);
@@ -301,9 +319,8 @@ fn one_component_answers_the_mean_everywhere() {
 
 /// Colour less the mean where x, y and the angles are given.
 fn one(packed: &Packed, [x, y, la, ls, va, vs]: [f32; INPUTS]) -> [f32; 3] {
-    let mut out = [[f32::NAN; 3]];
-    prediction::few(packed, [la, ls, va, vs], &[[x, y]], &mut out);
-    out[0]
+    let exponents = [(0, x), (1, y)].map(|(axis, at)| prediction::exponents(packed, axis, at));
+    prediction::one(packed, [la, ls, va, vs], &[exponents.each_ref().map(Vec::as_slice)])[0]
 }
 
 /// Components of equal deviations along x, with their positions as colours 0, 1, …
@@ -331,7 +348,7 @@ fn texels_asked_for_together_answer_as_alone() {
 
 #[test]
 fn two_equal_components_share_by_a_logistic_curve() {
-    let packed = Packed::new(&along_x(&[-1.0, 1.0], 0.8));
+    let packed = Packed::new(&along_x(&[-1.0, 1.0], 0.8), Default::default());
     let found = one(&packed, [0.3, 0.0, 0.0, 0.0, 0.0, 0.0]);
     assert!((found[0] - 0.718_594).abs() < 1e-6, "{found:?}");
     let picture = prediction::picture(&packed, &[0.3], &[0.0], [0.0; 4]);
@@ -353,14 +370,80 @@ fn order_and_units_do_not_matter() {
         .collect();
     for x in [-2.0f32, 0.3, 0.9, 5.0] {
         let [a, b, c] = [(&components, x), (&reversed, x), (&scaled, 100.0 * x)]
-            .map(|(all, x)| one(&Packed::new(all), [x, 0.0, 0.0, 0.0, 0.0, 0.0])[0]);
+            .map(|(all, x)| one(&Packed::new(all, Default::default()), [x, 0.0, 0.0, 0.0, 0.0, 0.0])[0]);
         assert!((a - b).abs() < 1e-5 && (a - c).abs() < 1e-5, "{a} {b} {c}");
     }
 }
 
 #[test]
+fn differences_are_to_the_nearest_image() {
+    let period = Period::of(10);
+    for (difference, nearest) in [(0.0, 0.0), (4.5, 4.5), (5.5, -4.5), (-5.5, 4.5), (9.0, -1.0), (-9.75, 0.25)] {
+        assert_eq!(period.nearest_of(difference), nearest);
+        assert_eq!(period.nearest(Plain::splat(difference)).largest(), nearest);
+        assert_eq!(Period::default().nearest(Plain::splat(difference)).largest(), difference);
+    }
+    assert_eq!((period.within(12.5), period.within(-0.5), Period::default().within(12.5)), (2.5, 9.5, 12.5));
+}
+
+/// Two components at 1 and 5 of a period of 8, told apart by their colours: both images of a place see them alike.
+#[test]
+fn a_place_and_its_image_answer_alike() {
+    let packed = Packed::new(&along_x(&[1.0, 5.0], 0.8), [Period::of(8), Period::default()]);
+    let at = |x: f32| one(&packed, [x, 0.0, 0.0, 0.0, 0.0, 0.0])[0];
+    for (x, image) in [(7.5, -0.5), (7.0, 3.0), (6.25, 14.25)] {
+        assert!((at(x) - at(image)).abs() < 1e-6, "{x}: {} {}", at(x), at(image));
+    }
+    // 1 / (1 + exp((2.9² − 1.1²) / 2 · 0.8²)), and with 1.5² − 2.5².
+    assert!((at(7.9) - 0.003_593_6).abs() < 1e-6 && (at(6.5) - 0.957_912).abs() < 1e-6, "{} {}", at(7.9), at(6.5));
+    let picture = prediction::picture(&packed, &[7.5, 6.25], &[0.0], [0.0; 4]);
+    assert!((picture[0] - at(7.5)).abs() < 1e-6 && (picture[3] - at(6.25)).abs() < 1e-6, "{picture:?}");
+}
+
+#[test]
+fn tiles_that_continue_themselves_are_told_by_their_borders() {
+    let periods = |btf: &Btf| Grid::of(btf).periods.map(|period| period.length);
+    let ramp = tile([12, 8], [rings(3), rings(3)], |x, y, l, v| stripes(8.0 * x / 36.0, y, l, v));
+    assert_eq!(periods(&ramp), [0.0, 8.0]);
+    assert_eq!(periods(&striped()), [8.0; 2]);
+}
+
+/// A bump anywhere, upon the corner as in the middle, is fitted alike.
+#[test]
+fn where_a_tile_begins_makes_no_difference() {
+    let bump = |shift: [f64; 2]| {
+        let far = |a: f64| (a.rem_euclid(12.0)).min(12.0 - a.rem_euclid(12.0));
+        tile([12, 12], [rings(3), rings(3)], |x, y, l, _| {
+            [0.2 + 0.5 * l.z * (-(far(x - shift[0]).powi(2) + far(y - shift[1]).powi(2)) / 12.0).exp(); 3]
+        })
+    };
+    let in_the_middle = bump([6.0; 2]);
+    let (grid, pairs) = (Grid::of(&in_the_middle), all_pairs(&in_the_middle));
+    let components = start(&grid, &pairs, 9, &SHAPES[0], &FLOORS, 1);
+    let after_six_rounds = |shift: f64| {
+        let btf = bump([6.0 + shift; 2]);
+        let grid = Grid::of(&btf);
+        assert_eq!(grid.periods, [Period::of(12); 2], "{shift}");
+        let moved = |c: &Component| {
+            let mut moved = *c;
+            // Off the middles of texels, for half a period is as far in both directions.
+            moved.mean[..2].iter_mut().for_each(|mean| *mean = grid.periods[0].within(*mean + shift + 0.3));
+            moved
+        };
+        let mut components: Vec<Component> = components.iter().map(moved).collect();
+        for _ in 0..6 {
+            let found = expect(&grid, &Packed::new(&components, grid.periods), all(&pairs), 14.0);
+            components = maximise(&grid, &components, &found, &FLOORS);
+        }
+        likelihood(&expect(&grid, &Packed::new(&components, grid.periods), all(&pairs), 14.0))
+    };
+    let [middle, corner, between] = [0.0, 6.0, 3.0].map(after_six_rounds);
+    assert!((corner - middle).abs() < 1e-4 && (between - middle).abs() < 1e-4, "{middle} {corner} {between}");
+}
+
+#[test]
 fn far_from_all_components_the_nearest_answers() {
-    let packed = Packed::new(&along_x(&[-1.0, 1.0], 0.01));
+    let packed = Packed::new(&along_x(&[-1.0, 1.0], 0.01), Default::default());
     assert_eq!(one(&packed, [50.0, 50.0, 1.5, 1.0, 1.5, 1.0])[0], 1.0);
     assert_eq!(prediction::picture(&packed, &[50.0], &[50.0], [1.5; 4])[0], 1.0);
 }
@@ -457,7 +540,7 @@ fn empty_components_take_half_of_another() {
     let spread = spread(&grid, &all_pairs(&btf));
     let mut components = start(&grid, &all_pairs(&btf), 3, &SHAPES[0], &FLOORS, 1);
     components[1].weight = 0.0;
-    assert_eq!(reseed(&mut components, 1000.0, &spread, &FLOORS), 1);
+    assert_eq!(reseed(&grid, &mut components, 1000.0, &spread, &FLOORS), 1);
     assert!(components.iter().all(|c| c.weight > 0.2), "{components:?}");
     assert!((components.iter().map(|c| c.weight).sum::<f64>() - 1.0).abs() < 1e-12);
     assert_ne!(components[0].mean, components[1].mean);
@@ -588,7 +671,7 @@ fn plain_loops_and_vector_instructions_agree() {
     let btf = striped();
     let (grid, pairs) = (Grid::of(&btf), all_pairs(&btf));
     let components = start(&grid, &pairs, 30, &SHAPES[0], &FLOORS, 3);
-    let packed = Packed::new(&components);
+    let packed = Packed::new(&components, grid.periods);
     let fast = expect(&grid, &packed, all(&pairs), 14.0);
     let mut plain = expect(&grid, &packed, all(&[]), 14.0);
     expect_with::<Plain>(&grid, &packed, all(&pairs), 14.0, &mut plain);
@@ -597,8 +680,9 @@ fn plain_loops_and_vector_instructions_agree() {
         assert!((a[0] - b[0]).abs() < 1e-4 * b[0] && (a[8] - b[8]).abs() < 1e-4 * b[8], "{a:?} {b:?}");
     }
     let at = [3.0, 4.0, 0.1, 0.2, -0.3, 0.4];
-    let mut plain = [[0.0; 3]];
-    prediction::few_with::<Plain>(&packed, [0.1, 0.2, -0.3, 0.4], &[[3.0, 4.0]], &mut plain);
+    let exponents = [(0, 3.0), (1, 4.0)].map(|(axis, at)| prediction::exponents(&packed, axis, at));
+    let place = exponents.each_ref().map(Vec::as_slice);
+    let plain = prediction::together::<Plain, 1>(&packed, [0.1, 0.2, -0.3, 0.4], &[place]);
     let [a, b] = [one(&packed, at), plain[0]];
     assert!((0..3).all(|c| (a[c] - b[c]).abs() < 1e-6), "{a:?} {b:?}");
 }
@@ -639,8 +723,11 @@ fn any_codec() -> impl Strategy<Value = GaussianMixture> {
     let component =
         (1e-6..1.0f64, prop::array::uniform6(0.0..1.0f64), prop::array::uniform6(0.1..1.5f64), -1.9..1.9f64);
     let precision = prop_oneof![Just(Precision::Full), Just(Precision::Compact)];
-    (prop::collection::vec(component, 1..40), precision).prop_map(|(all, precision)| {
+    let wraps = [any::<bool>(), any::<bool>()];
+    (prop::collection::vec(component, 1..40), precision, wraps).prop_map(|(all, precision, wraps)| {
         let frame = small_frame();
+        let period = |wraps: bool, side: usize| if wraps { Period::of(side) } else { Period::default() };
+        let periods = [period(wraps[0], frame.width), period(wraps[1], frame.height)];
         let make = |(weight, at, wide, colour): (f64, [f64; INPUTS], [f64; INPUTS], f64)| {
             let mean = std::array::from_fn(|v| if v < INPUTS { at[v] } else { colour });
             let sigma = std::array::from_fn(|v| if v < INPUTS { wide[v] } else { 0.1 });
@@ -648,7 +735,7 @@ fn any_codec() -> impl Strategy<Value = GaussianMixture> {
         };
         let mean = (0..3 * frame.pairs()).map(|k| k as u8).collect();
         let components = all.into_iter().map(make).collect();
-        GaussianMixture::new(frame.clone(), precision, mean, components)
+        GaussianMixture::new(frame.clone(), precision, periods, mean, components)
     })
 }
 

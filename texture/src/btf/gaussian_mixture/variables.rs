@@ -11,8 +11,10 @@
 //! s = sin β, for cells `Δα · Δs` are equal solid angles. The source's arccosines lose the sign of y, and exceed 1
 //! by rounding in one of three directions within the plane of x; arctangents do neither.
 
+use super::lanes::Vector;
 use capture::btf::Btf;
 use nalgebra::Vector3;
+use rayon::prelude::*;
 use std::borrow::Cow;
 
 /// Variables of a sample.
@@ -35,6 +37,8 @@ pub(super) struct Grid<'a> {
     pub(super) x: Vec<f32>,
     /// Per row, texels.
     pub(super) y: Vec<f32>,
+    /// Of x and y.
+    pub(super) periods: [Period; 2],
     /// α and s of each light.
     pub(super) lights: Vec<[f32; 2]>,
     /// α and s of each view.
@@ -43,6 +47,75 @@ pub(super) struct Grid<'a> {
     pub(super) mean: Vec<u8>,
     /// (view, light, y, x, channel).
     pub(super) samples: Cow<'a, [f32]>,
+}
+
+/// Whether places along an axis begin again, and after how many texels.
+///
+/// A difference from a mean is that to the mean's nearest image. The sum over all images, a wrapped normal, differs
+/// from this by less than `2 exp(−T²/8σ²)`, T the period.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Period {
+    /// Texels; 0 where they do not.
+    pub(super) length: f32,
+    /// Its inverse; 0 where they do not.
+    inverse: f32,
+}
+
+impl Period {
+    /// After `length` texels.
+    pub(super) fn of(length: usize) -> Self {
+        Self { length: length as f32, inverse: 1.0 / length as f32 }
+    }
+
+    /// The shortest of differences that are whole periods apart.
+    #[inline(always)]
+    pub(super) fn nearest<V: Vector>(self, difference: V) -> V {
+        difference.times(V::splat(self.inverse)).rounded().times_plus(V::splat(-self.length), difference)
+    }
+
+    /// The same of one number.
+    pub(super) fn nearest_of(self, difference: f32) -> f32 {
+        difference - self.length * (difference * self.inverse).round_ties_even()
+    }
+
+    /// The image of a place that lies within the tile.
+    pub(super) fn within(self, place: f64) -> f64 {
+        if self.length > 0.0 { place.rem_euclid(f64::from(self.length)) } else { place }
+    }
+}
+
+/// Where the tile continues itself, texels differ across the border by at most this times what some neighbours within do.
+const SEAM: f64 = 1.1;
+
+/// Those of the axes along which the tile continues itself.
+fn periods(btf: &Btf) -> [Period; 2] {
+    let continues = |steps: &[f64]| match steps {
+        [within @ .., border] => within.len() > 1 && *border <= SEAM * within.iter().copied().fold(0.0, f64::max),
+        [] => false,
+    };
+    let [across, down] = steps(btf).map(|steps| continues(&steps));
+    [(across, btf.width), (down, btf.height)]
+        .map(|(continues, side)| if continues { Period::of(side) } else { Period::default() })
+}
+
+/// How much texels differ from those of the next column, and of the next row, summed over both; last, across the border.
+fn steps(btf: &Btf) -> [Vec<f64>; 2] {
+    let (width, height) = (btf.width, btf.height);
+    let of_picture = |picture: &[f32]| {
+        let difference = |a: usize, b: usize| -> f64 {
+            (0..3).map(|c| f64::from((picture[3 * a + c] - picture[3 * b + c]).abs())).sum()
+        };
+        let (mut across, mut down) = (vec![0.0; width], vec![0.0; height]);
+        for texel in 0..width * height {
+            let (x, y) = (texel % width, texel / width);
+            across[x] += difference(texel, y * width + (x + 1) % width);
+            down[y] += difference(texel, (y + 1) % height * width + x);
+        }
+        [across, down]
+    };
+    let pictures: Vec<[Vec<f64>; 2]> = btf.samples.par_chunks(3 * btf.texels()).map(of_picture).collect();
+    let sum = |axis: usize, k: usize| pictures.iter().map(|steps| steps[axis][k]).sum::<f64>();
+    [(0..width).map(|x| sum(0, x)).collect(), (0..height).map(|y| sum(1, y)).collect()]
 }
 
 /// α and s = sin β of a unit vector; α is 0 where the direction is along the x axis and has none.
@@ -59,6 +132,7 @@ impl<'a> Grid<'a> {
         Self {
             x: centres(btf.width),
             y: centres(btf.height),
+            periods: periods(btf),
             lights: slices(&btf.lights),
             views: slices(&btf.views),
             mean: mean_picture(btf),

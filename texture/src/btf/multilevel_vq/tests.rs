@@ -299,11 +299,20 @@ fn items_are_as_many_as_asked_for_or_the_miss_is_told() {
     assert!(codec.entries()[6].1 == 1 && noted(&report), "{report:?}");
 }
 
+/// One item in every book is larger than was asked for: it is what is there, and the miss is told in bytes.
 #[test]
-fn a_ratio_that_nothing_gives_is_told() {
+fn a_ratio_that_nothing_gives_is_missed_by_the_least_there_is() {
     let btf = flat(4, &few(), [0.5, 0.4, 0.3]);
-    let (_, report) = fit(&btf, &options(&btf, Aim::Ratio(1e6), Precision::Compact)).unwrap();
-    assert!(report.notes.iter().any(|note| note.contains("came nearest")), "{report:?}");
+    let at = |ratio: f64| {
+        let (codec, report) = fit(&btf, &options(&btf, Aim::Ratio(ratio), Precision::Compact)).unwrap();
+        let note = report.notes.iter().find(|note| note.contains("came nearest")).cloned();
+        (byte_count(&btf, &codec), codec, note)
+    };
+    let (bytes, least, note) = at(1e6);
+    assert!(bytes as f64 > 100.0 * btf.raw_bytes() as f64 / 1e6, "{bytes}");
+    assert!(note.as_ref().is_some_and(|note| note.starts_with(&format!("{bytes} came nearest"))), "{bytes}: {note:?}");
+    assert!(least.entries().iter().all(|(_, count)| *count <= 1), "{:?}", least.entries());
+    assert_eq!(at(1e5).1, least);
 }
 
 #[test]
