@@ -104,6 +104,7 @@ fn counts(found: &Image<u8>, truth: &Image<u8>) -> [f64; 3] {
     })
 }
 
+/// Pixels whose centres lie within a pixel of the true edge, which runs half way between centres: the two rows along it.
 fn wrong_at_edge(found: &Image<u8>, truth: &Image<u8>) -> f64 {
     let distance = signed_distance(truth);
     let pixels = found.pixels().iter().zip(truth.pixels()).zip(distance.pixels());

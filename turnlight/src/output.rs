@@ -4,7 +4,7 @@ use crate::Error;
 use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
-use tempfile::{Builder, TempDir};
+use tempfile::{Builder, TempDir, TempPath};
 
 /// Writes `bytes` to `path`, whole or not at all.
 ///
@@ -38,6 +38,23 @@ pub fn check_writable(path: &Path) -> Result<(), Error> {
         _ => Builder::new().prefix(".turnlight-").tempfile_in(parent(path)).map(drop),
     };
     probe().map_err(|source| cannot_write(path, source))
+}
+
+/// Moves a file to the first of `places` where there is nothing, and says where; replaces nothing.
+///
+/// # Errors
+/// Names the place and what the system said; where no place is free.
+pub fn move_to_first_free(file: &Path, places: impl IntoIterator<Item = PathBuf>) -> Result<PathBuf, Error> {
+    let mut file = TempPath::try_from_path(file).map_err(|source| cannot_write(file, source))?;
+    for place in places.into_iter().filter(|place| !place.exists()) {
+        match file.persist_noclobber(&place) {
+            Ok(()) => return Ok(place),
+            // Somebody was quicker.
+            Err(refused) if place.exists() => file = refused.path,
+            Err(refused) => return Err(cannot_write(&place, refused.error)),
+        }
+    }
+    Err(all_taken(&file))
 }
 
 /// A folder under construction. Dropped without [`OutputFolder::finish`], it leaves nothing.
@@ -125,9 +142,12 @@ impl OutputFolder {
                 Err(source) => return Err(cannot_write(&place, source)),
             }
         }
-        let fault = "and all names like it are taken; move some of these folders away";
-        Err(Error::Failed(format!("{}: {fault}", self.target.display())))
+        Err(all_taken(&self.target))
     }
+}
+
+fn all_taken(path: &Path) -> Error {
+    Error::Failed(format!("{}: all names like it are taken; move some of them away", path.display()))
 }
 
 /// Lies in every folder we write, so that a second run may replace it and nobody else's folder goes.
@@ -214,6 +234,20 @@ mod tests {
         assert!(third.is_err());
         assert_eq!(places().map(|path| fs::read(path.join("x.txt")).unwrap()), [b"1", b"2"]);
         assert_eq!(fs::read_dir(place.path()).unwrap().count(), 2);
+    }
+
+    #[test]
+    fn a_file_goes_where_there_is_nothing() {
+        let place = tempfile::tempdir().unwrap();
+        let places = || ["1.mp4", "2.mp4"].map(|name| place.path().join(name));
+        let move_one = |content: &[u8]| {
+            let file = place.path().join("film");
+            fs::write(&file, content).unwrap();
+            move_to_first_free(&file, places())
+        };
+        assert_eq!([move_one(b"1").unwrap(), move_one(b"2").unwrap()], places());
+        assert!(move_one(b"3").is_err());
+        assert_eq!(places().map(|path| fs::read(path).unwrap()), [b"1", b"2"]);
     }
 
     #[test]

@@ -87,12 +87,15 @@ impl Painter {
 
     #[cfg(feature = "gpu")]
     fn device(&self) -> Result<gpu::Device, gpu::GpuError> {
-        let device = self.device.get_or_init(gpu::Device::headless).clone()?;
-        if self.choice == Choice::Auto && device.is_software() {
-            let fault = format!("{} is itself a program on the CPU", device.name());
-            return Err(gpu::GpuError::NoAdapter { fault });
-        }
-        Ok(device)
+        let found = || {
+            let device = gpu::Device::headless()?;
+            if self.choice == Choice::Auto && device.is_software() {
+                let fault = format!("{} is itself a program on the CPU", device.name());
+                return Err(gpu::GpuError::NoAdapter { fault });
+            }
+            Ok(device)
+        };
+        self.device.get_or_init(found).clone()
     }
 }
 

@@ -1,7 +1,7 @@
 //! What is assumed of lenses, and how one is stepped.
 
 use super::{LensKnowledge, LensParameter, LensTerm, Source};
-use crate::{Distortion, Intrinsics};
+use crate::Intrinsics;
 use nalgebra::{DMatrix, DVector};
 
 /// Deviation of the logarithm of a focal length around [`FOCAL`]: two of them reach from a half to three widths.
@@ -67,10 +67,8 @@ impl LensPrior {
     }
 
     /// The lens thought likeliest before anything is seen.
-    pub(super) fn lens(&self, [width, height]: [usize; 2]) -> Intrinsics {
-        let focal = self.mean[0].exp();
-        let [cx, cy] = [self.mean[2], self.mean[3]];
-        Intrinsics { fx: focal, fy: focal, skew: 0.0, cx, cy, distortion: Distortion::default(), width, height }
+    pub(super) fn lens(&self, size: [usize; 2]) -> Intrinsics {
+        Intrinsics::pinhole(self.mean[0].exp(), size)
     }
 
     /// How far a parameter lies from what is assumed, and that divided by the variance: half the gradient of

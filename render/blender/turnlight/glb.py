@@ -17,11 +17,11 @@ EXTENSION = "TURNLIGHT_view_dependent_texture"
 VERSION = 1
 METHODS = ("static", "vdtm", "dyntex", "lumigraph")
 
-# As the other readers: no atlas has more texels, or a longer side.
+# As the other readers: no atlas has more texels, or a longer side. Memory ends earlier than texels do.
 MOST_TEXELS = 2**26
 LONGEST_SIDE = 2**15
 # Memory that a model may take; a few hundred bytes of PNG can ask for any amount.
-MOST_BYTES = 2**32
+MOST_BYTES = 2**33
 # What a texel takes in a layer, in a ray (colour and number of the view), and beside them: while a picture is decoded,
 # blended and handed to Blender.
 LAYER_BYTES, RAY_BYTES, TEXEL_BYTES = 3, 5, 192
@@ -233,7 +233,8 @@ def _refuse_excess(reader, said, size):
     each = RAY_BYTES * len(rays) + LAYER_BYTES * (len(named) - 2 * len(rays)) + TEXEL_BYTES
     needed = each * size[0] * size[1]
     if needed > MOST_BYTES:
-        raise ModelError(f"it takes {needed >> 20} MiB, where {MOST_BYTES >> 20} are allowed")
+        remedy = "make it with a smaller atlas, or with fewer layers"
+        raise ModelError(f"it takes {needed >> 20} MiB, where {MOST_BYTES >> 20} are allowed; {remedy}")
 
 
 def _read_mesh(reader):

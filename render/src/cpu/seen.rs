@@ -18,6 +18,7 @@ pub(super) struct Run {
     pub(super) row: u32,
     /// First column over the frame.
     pub(super) column: u32,
+    /// At most a tile's side.
     pub(super) length: u16,
     /// Which of the tile's surfaces.
     pub(super) surface: u32,
@@ -87,8 +88,8 @@ impl Seen {
     #[inline(always)]
     fn surface(&mut self, geometry: &Geometry, patch: &Patch, slot: usize, face: u32) -> Option<u32> {
         if self.made[slot] == NONE {
-            self.made[slot] = self.surfaces.len() as u32;
             self.surfaces.push(geometry.surface(face, patch)?);
+            self.made[slot] = self.surfaces.len() as u32 - 1;
         }
         Some(self.made[slot])
     }

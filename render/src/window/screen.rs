@@ -152,7 +152,7 @@ enum Shown {
     Whole,
     /// Of another size than the window now.
     Outdated,
-    /// Gone, as after a driver has been reset: it takes another one.
+    /// The surface alone is gone: it takes another one.
     Lost,
     Hidden,
 }

@@ -68,7 +68,7 @@ fn curves(comparison: &CodecComparison, axis: Axis) -> Vec<Curve> {
     for run in &comparison.runs {
         let Some(evaluation) = &run.evaluation else { continue };
         let Some(x) = axis.of(evaluation, texels) else { continue };
-        let point = (x, evaluation.score.rmse.max(0.01));
+        let point = (x, evaluation.score.rmse);
         match curves.iter_mut().find(|curve| curve.name == run.name) {
             Some(curve) => curve.points.push(point),
             None => curves.push(Curve { name: run.name, points: vec![point] }),
@@ -118,9 +118,10 @@ fn draw(comparison: &CodecComparison, axis: Axis, svg: &mut String) -> Result<()
     Ok(())
 }
 
-/// 1, 2 and 5 times powers of ten within a range.
+/// 1, 2 and 5 times powers of ten within a range; of a short one its ends.
 fn ticks(range: &std::ops::Range<f64>) -> Vec<f64> {
     let (first, last) = (range.start.log10().floor() as i32, range.end.log10().ceil() as i32);
     let steps = (first..=last).flat_map(|power| [1.0, 2.0, 5.0].map(|step| step * 10f64.powi(power)));
-    steps.filter(|tick| range.contains(tick)).collect()
+    let ticks: Vec<f64> = steps.filter(|tick| range.contains(tick)).collect();
+    if ticks.len() < 2 { vec![range.start, range.end] } else { ticks }
 }

@@ -32,14 +32,17 @@ fn serve(args: &ViewArgs, model: &Path, announce: impl FnOnce(&Answer) -> Result
 
 #[cfg(feature = "window")]
 fn window(args: &ViewArgs) -> Result<(), Error> {
-    use super::{choice, read_capture};
+    use super::{check_extension, choice, read_capture};
     use turnlight::output::check_writable;
     use turnlight::playback;
     use turnlight::viewer::{Exhibit, Viewer, ViewerOptions};
     use turnlight::window::{WindowOptions, show};
 
     let wanted = &args.window;
-    wanted.screenshot.as_deref().map_or(Ok(()), check_writable)?;
+    if let Some(picture) = &wanted.screenshot {
+        check_extension(picture, &["png"])?;
+        check_writable(picture)?;
+    }
     let exhibits = Exhibit::read_all(&args.models)?;
     let capture = wanted.capture.as_deref().map(|path| read_capture(path, false)).transpose()?;
     let models = || exhibits.iter().map(|exhibit| &exhibit.scene.models);

@@ -5,6 +5,8 @@ use crate::Error;
 #[cfg(feature = "video")]
 use crate::film::Film;
 use crate::output::OutputFolder;
+#[cfg(feature = "video")]
+use crate::output::move_to_first_free;
 use crate::viewer::Viewer;
 use ::capture::{Camera, Image};
 use render::film::write_png;
@@ -21,12 +23,13 @@ const TURN: &str = "-turn";
 #[cfg(feature = "video")]
 const FILM: &str = ".mp4";
 
+/// A film's name in its folder.
+#[cfg(feature = "video")]
+const STAGED: &str = "turn.mp4";
+
 /// Frames of a film a second: a turn in three.
 #[cfg(feature = "video")]
 const FPS: f64 = 24.0;
-
-/// What a turn is written as.
-pub(super) const TURN_KIND: &str = if cfg!(feature = "video") { "film" } else { "pictures" };
 
 /// What is being written.
 pub(super) struct Recorder {
@@ -42,6 +45,8 @@ pub(super) struct Recorder {
 
 /// A turn that is being written, a picture a frame of the window.
 struct Turn {
+    /// What it is named by.
+    name: String,
     reel: Reel,
     cameras: Vec<Camera>,
     next: usize,
@@ -49,11 +54,11 @@ struct Turn {
 
 /// Where its pictures go.
 enum Reel {
-    /// A folder, and what it is named by.
-    Pictures(OutputFolder, String),
-    /// A film, and its file.
+    /// A folder of them.
+    Pictures(OutputFolder),
+    /// A film, in a folder of its own until it is whole.
     #[cfg(feature = "video")]
-    Film(Box<Film>, PathBuf),
+    Film(Box<Film>, OutputFolder),
 }
 
 impl Recorder {
@@ -94,9 +99,7 @@ impl Recorder {
             return Some(self.picture(viewer, size).unwrap_or_else(|fault| fault.to_string()));
         }
         if std::mem::take(&mut self.wants_turn) {
-            return Some(
-                self.begin(viewer, size).map_or_else(|fault| fault.to_string(), |()| "writing a turn".to_owned()),
-            );
+            return Some(self.begin(viewer, size).unwrap_or_else(|fault| fault.to_string()));
         }
         let turn = self.turn.take()?;
         match turn.advance(viewer) {
@@ -116,32 +119,33 @@ impl Recorder {
         Ok(format!("wrote {}", path.display()))
     }
 
-    fn begin(&mut self, viewer: &Viewer<'_>, size: [usize; 2]) -> Result<(), Error> {
+    /// Says what the turn is written as.
+    fn begin(&mut self, viewer: &Viewer<'_>, size: [usize; 2]) -> Result<String, Error> {
         // Films have even sides.
         let even = size.map(|side| side / 2 * 2);
-        let (reel, size) = match film(&self.name, even) {
-            Some(film) => (film, even),
-            None => {
-                let folder = OutputFolder::create(&free_name(&self.name, TURN))?;
-                (Reel::Pictures(folder, self.name.clone()), size)
-            }
+        let folder = OutputFolder::create(&free_name(&self.name, TURN))?;
+        let (reel, size, kind) = match film(folder, even) {
+            Ok(reel) => (reel, even, "writing a film".to_owned()),
+            Err((folder, fault)) => (Reel::Pictures(folder), size, format!("writing pictures: {fault}")),
         };
-        self.turn = Some(Turn { reel, cameras: viewer.orbit().turn(TURN_FRAMES, size), next: 0 });
-        Ok(())
+        let cameras = viewer.orbit().turn(TURN_FRAMES, size);
+        self.turn = Some(Turn { name: self.name.clone(), reel, cameras, next: 0 });
+        Ok(kind)
     }
 }
 
-/// `None` where this build or this machine writes none.
+/// The folder back, and why, where this build or this machine writes none.
 #[cfg(feature = "video")]
-fn film(name: &str, size: [usize; 2]) -> Option<Reel> {
-    let path = free_name(name, FILM);
-    let film = Film::create(&path, size, FPS).ok()?;
-    Some(Reel::Film(Box::new(film), path))
+fn film(folder: OutputFolder, size: [usize; 2]) -> Result<Reel, (OutputFolder, String)> {
+    match folder.place(STAGED).and_then(|path| Film::create(&path, size, FPS)) {
+        Ok(film) => Ok(Reel::Film(Box::new(film), folder)),
+        Err(fault) => Err((folder, fault.to_string())),
+    }
 }
 
 #[cfg(not(feature = "video"))]
-fn film(_: &str, _: [usize; 2]) -> Option<Reel> {
-    None
+fn film(folder: OutputFolder, _: [usize; 2]) -> Result<Reel, (OutputFolder, String)> {
+    Err((folder, "this turnlight was built without films".to_owned()))
 }
 
 enum Written {
@@ -151,7 +155,7 @@ enum Written {
 
 impl Turn {
     fn advance(mut self, viewer: &mut Viewer<'_>) -> Result<Written, Error> {
-        let Some(camera) = self.cameras.get(self.next) else { return Ok(Written::All(self.reel.finish()?)) };
+        let Some(camera) = self.cameras.get(self.next) else { return Ok(Written::All(self.reel.finish(&self.name)?)) };
         self.reel.push(self.next, &viewer.frame_of(camera))?;
         self.next += 1;
         Ok(Written::More(self))
@@ -161,19 +165,21 @@ impl Turn {
 impl Reel {
     fn push(&mut self, number: usize, frame: &Image<[u8; 4]>) -> Result<(), Error> {
         match self {
-            Self::Pictures(folder, _) => Ok(write_png(&folder.place(format!("{number:04}.png"))?, frame)?),
+            Self::Pictures(folder) => Ok(write_png(&folder.place(format!("{number:04}.png"))?, frame)?),
             #[cfg(feature = "video")]
             Self::Film(film, _) => film.push(frame),
         }
     }
 
-    /// Makes it appear at its place, and says where.
-    fn finish(self) -> Result<PathBuf, Error> {
+    /// Makes it appear at the first free name, and says where: another window may have taken that of the start.
+    fn finish(self, name: &str) -> Result<PathBuf, Error> {
         match self {
-            // Another window may have taken the name that was free at the start.
-            Self::Pictures(folder, name) => folder.finish_at_first_free(numbered(&name, TURN)),
+            Self::Pictures(folder) => folder.finish_at_first_free(numbered(name, TURN)),
             #[cfg(feature = "video")]
-            Self::Film(film, path) => film.finish().map(|()| path),
+            Self::Film(film, folder) => {
+                film.finish()?;
+                move_to_first_free(&folder.place(STAGED)?, numbered(name, FILM))
+            }
         }
     }
 }
@@ -195,7 +201,7 @@ impl App<'_> {
             if ui.button("Picture").on_hover_text("as it is, to a PNG in the current folder (S)").clicked() {
                 self.recorder.ask_picture();
             }
-            let hint = format!("{TURN_FRAMES} views all around, as {TURN_KIND} in the current folder (T)");
+            let hint = format!("{TURN_FRAMES} views all around, as a film or pictures in the current folder (T)");
             if ui.button("Turn").on_hover_text(hint).clicked() {
                 self.recorder.ask_turn();
             }

@@ -169,7 +169,7 @@ impl Stored for GaussianMixture {
         let precision = match how {
             0..8 if how & 1 == 1 => Precision::Compact,
             0..8 => Precision::Full,
-            other => return Err(Fault(format!("precision {other} is unknown"))),
+            other => return Err(Fault(format!("flags {other} are unknown; read it with a newer turnlight"))),
         };
         let period = |bit: u8, side: usize| if how & bit != 0 { Period::of(side) } else { Period::default() };
         let periods = [period(2, frame.width), period(4, frame.height)];

@@ -52,7 +52,7 @@ pub(super) struct Grid<'a> {
 /// Whether places along an axis begin again, and after how many texels.
 ///
 /// A difference from a mean is that to the mean's nearest image. The sum over all images, a wrapped normal, differs
-/// from this by less than `2 exp(−T²/8σ²)`, T the period.
+/// from this by less than `2 exp(−T²/8σ²)` for deviations σ up to T, the period.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Period {
     /// Texels; 0 where they do not.
