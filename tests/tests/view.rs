@@ -4,7 +4,6 @@ use capture::{Camera, Capture, Image, read_rgb};
 use render::material::Coats;
 use render::path::TURN_FRAMES;
 use std::path::Path;
-use std::process::Command;
 use std::sync::OnceLock;
 use tests::hostile::{Hostile, hostile};
 use tests::played::played;
@@ -260,7 +259,7 @@ mod on_a_screen {
     use super::*;
     use std::fs;
     use std::io::{BufRead, BufReader};
-    use std::process::{Child, Stdio};
+    use std::process::{Child, Command, Stdio};
     use std::time::{Duration, Instant};
 
     /// A screen in memory, as large as the window, and what is on it.
