@@ -22,14 +22,16 @@
 //! which take 4 % of the samples; in memory M × (lights + views) sums for each of 32 parts and M² for the refit.
 //! An answer: M densities of six variables, sixteen at a time; those of light and eye once for texels asked for together.
 //!
-//! **Tiles** that continue themselves are coded so: along an axis where texels differ at most 1.1 times as much across the
-//! border as where they differ most within, the difference of a place from a mean is that to the nearest of the mean's images, in the fit as in
-//! answers. Components wider than a third of the tile lose what would reach around it ([`variables::Period`]).
+//! **Tiles** that continue themselves are coded so: along an axis where texels differ at most 1.1 times as much across
+//! the border as where they differ most within, the difference of a place from a mean is that to the nearest of the
+//! mean's images, in the fit as in answers. Components wider than a third of the tile lose what would reach around it
+//! ([`variables::Period`]).
 //!
 //! **Limits**: structures and highlights sharper than the components are wide are blurred, and of a tile whose
 //! texels hardly resemble their neighbours little more than the mean picture is left. What has no variation (one texel,
-//! one light, constant colour) puts deviations on their floors and changes no answer. More components than samples are not made. Samples that are not finite, or far outside 0 to 1, are
-//! refused. Under a direction that is no direction, the answer is that for the normal.
+//! one light, constant colour) puts deviations on their floors and changes no answer. More components than samples are
+//! not made. Samples that are not finite, or far outside 0 to 1, are refused. Under a direction that is no direction,
+//! the answer is that for the normal.
 //!
 //! Source: Filip, Grim, Haindl, "A probabilistic approach to rough texture compression and rendering", ICIP 2013
 //! (equations 1–11). Signed angles, floors, the grid's structure and the refit are not theirs.
