@@ -291,7 +291,15 @@ function readMesh(reader, index) {
 /** Of each face whether a material lies on its chart: charts are what hangs together by vertices, numbered by first faces. */
 function coatedFaces({ positions, faces }, e) {
   const coated = new Uint8Array(faces.length / 3);
-  const laid = new Set(list(e.materials).flatMap((material) => list(material?.charts)));
+  const laid = new Set();
+  for (const material of list(e.materials)) {
+    const charts = new Set(list(material?.charts));
+    if (charts.size === 0) throw new ModelError('a material lies on no chart');
+    for (const chart of charts) {
+      if (laid.has(chart)) throw new ModelError(`two materials lie on chart ${chart}`);
+      laid.add(chart);
+    }
+  }
   if (laid.size === 0) return coated;
   const parent = Uint32Array.from({ length: positions.length / 3 }, (_, v) => v);
   const root = (v) => {
@@ -308,7 +316,9 @@ function coatedFaces({ positions, faces }, e) {
     coated[f] = laid.has(charts.get(chart)) ? 1 : 0;
   }
   for (const chart of laid) {
-    if (!isIndex(chart) || chart >= charts.size) throw new ModelError(`a material lies on chart ${chart} of ${charts.size}`);
+    if (!isIndex(chart) || chart >= charts.size) {
+      throw new ModelError(`a material lies on chart ${chart}; the model has ${charts.size} charts`);
+    }
   }
   return coated;
 }

@@ -32,6 +32,17 @@ pub fn hostile(model: &[u8]) -> Vec<Hostile> {
     cut.into_iter().chain(changed).map(|(name, word, bytes)| Hostile { name, word, bytes }).collect()
 }
 
+/// A model one chart of which has two materials, for players that know them.
+///
+/// # Panics
+/// Where `model` is none.
+pub fn coated_twice(model: &[u8]) -> Hostile {
+    let (mut root, body) = split(model);
+    let extension = root.pointer_mut(EXTENSION).unwrap_or_else(|| panic!("no extension"));
+    extension["materials"] = json!([{"charts": [0]}, {"charts": [1, 0]}]);
+    Hostile { name: "coated twice", word: "two materials lie on chart 0", bytes: joined(&root, &body) }
+}
+
 /// A model taken apart: the JSON and the binary chunk.
 fn split(glb: &[u8]) -> (Value, Vec<u8>) {
     let length = glb.get(12..16).and_then(|b| b.try_into().ok()).map_or(0, u32::from_le_bytes) as usize;

@@ -11,7 +11,7 @@ use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
-use tests::hostile::{Hostile, hostile};
+use tests::hostile::{Hostile, coated_twice, hostile};
 use tests::played::{COMPARED, Played, SHARE, agreement, frame, played};
 use texture::btf::{self, Budget, CodecKind, Precision};
 use texture::{MaterialLayer, Method, Model};
@@ -173,7 +173,8 @@ fn the_page_refuses_hostile_models_and_fetches_nothing() {
         eprintln!("skipped: chromium or node is not installed (apt-get install chromium nodejs)");
         return;
     };
-    let files = hostile(played().model(Method::DynTex));
+    let model = played().model(Method::DynTex);
+    let files = [hostile(model), vec![coated_twice(model)]].concat();
     let place = tempfile::tempdir().expect("a folder");
     let case = |file: &Hostile| json!({"url": serve(file.bytes.clone()), "output": place.path()});
     let cases: Vec<Value> = files.iter().map(case).collect();
