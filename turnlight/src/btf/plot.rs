@@ -85,6 +85,8 @@ fn draw(comparison: &CodecComparison, axis: Axis, svg: &mut String) -> Result<()
         if low > high { 1.0..10.0 } else { low / 1.3..high * 1.3 }
     };
     let along = range(|p| p.0);
+    // Where nothing is lost there is an axis, too.
+    let highest = range(|p| p.1).end.max(1.0);
     let root = SVGBackend::with_string(svg, (960, 420)).into_drawing_area();
     root.fill(&WHITE)?;
     // Beside the plot, where the names cover no mark.
@@ -93,7 +95,7 @@ fn draw(comparison: &CodecComparison, axis: Axis, svg: &mut String) -> Result<()
         .margin(10)
         .x_label_area_size(36)
         .y_label_area_size(56)
-        .build_cartesian_2d(along.clone().log_scale().with_key_points(ticks(&along)), 0.0..range(|p| p.1).end)?;
+        .build_cartesian_2d(along.clone().log_scale().with_key_points(ticks(&along)), 0.0..highest)?;
     let number = |value: &f64| format!("{}", (value * 1000.0).round() / 1000.0);
     chart
         .configure_mesh()

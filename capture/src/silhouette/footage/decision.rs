@@ -8,8 +8,8 @@ use super::palette::Palette;
 use crate::Image;
 use crate::matte::{components, signed_distance};
 
-/// Log odds gained inside the hull: enough where the picture says nothing, and no more. The hull fills what few frames look
-/// through, a loop of rope or the gap behind a tusk; what these see there is to be believed.
+/// Log odds gained inside the hull: enough where the picture says nothing, and no more. The hull fills what few frames
+/// look through, a loop of rope or the gap behind a tusk; what these see there is to be believed.
 const TRUST: f32 = 0.5;
 
 /// Log odds that a pixel of border costs where the picture is even.

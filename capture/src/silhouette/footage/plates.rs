@@ -32,7 +32,8 @@ const SUSPICIOUS: f32 = 2.0;
 /// little.
 const OF_A_FOOT: f32 = -1.0;
 
-/// The size of a covered place with the foot around it, as a multiple of all that is covered in nearly all frames, at most.
+/// The size of a covered place with the foot around it, as a multiple of all that is covered in nearly all frames, at
+/// most.
 const LARGEST_FOOT: f64 = 2.5;
 
 /// Of the (encoded) light on the print, what falls on parts of it in the mean of all frames.
