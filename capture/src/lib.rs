@@ -51,4 +51,4 @@ pub use image::Image;
 pub use load::reduced;
 pub use masks::MaskSource;
 pub use matte::{erode, grow, is_binary, signed_distance, smooth};
-pub use pixels::{read_matte, read_rgb, write_matte, write_rgb};
+pub use pixels::{has_transparency, read_matte, read_rgb, write_matte, write_rgb};

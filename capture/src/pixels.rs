@@ -18,7 +18,7 @@ pub(crate) fn noted_focal_px(path: &Path, size: [usize; 2]) -> Option<f64> {
 }
 
 /// Whether the file has an alpha channel and some pixel of it is not opaque. Unreadable files have none.
-pub(crate) fn has_transparency(path: &Path) -> bool {
+pub fn has_transparency(path: &Path) -> bool {
     let declared = reader(path).ok().and_then(|r| r.into_decoder().ok()).is_some_and(|d| d.color_type().has_alpha());
     declared && decode(path).is_ok_and(|image| image.to_rgba8().pixels().any(|p| p.0[3] < 255))
 }
@@ -31,14 +31,14 @@ pub fn read_rgb(path: &Path) -> Result<Image<[u8; 3]>, CaptureError> {
     Ok(split_alpha(&decode(path)?).0)
 }
 
-/// As [`read_rgb`], turned as the file's EXIF orientation says.
-pub(crate) fn read_rgb_upright(path: &Path) -> Result<Image<[u8; 3]>, CaptureError> {
+/// As [`read_rgb_and_alpha`], turned as the file's EXIF orientation says.
+pub(crate) fn read_rgb_and_alpha_upright(path: &Path) -> Result<(Image<[u8; 3]>, Image<u8>), CaptureError> {
     let mut decoder = reader(path)?.into_decoder().map_err(|error| fault(path, error))?;
     // What cannot be read of the notes beside the picture is as if nothing were noted.
     let orientation = decoder.orientation().unwrap_or(Orientation::NoTransforms);
     let mut image = DynamicImage::from_decoder(decoder).map_err(|error| fault(path, error))?;
     image.apply_orientation(orientation);
-    Ok(split_alpha(&image).0)
+    Ok(split_alpha(&image))
 }
 
 /// As [`read_rgb`], with the alpha channel as a matte (255 everywhere without one).

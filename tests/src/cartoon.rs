@@ -2,7 +2,7 @@
 //! photographs (`data_synth::footage` takes those), but every truth is known in closed form, and every fault of real
 //! footage can be had.
 
-use capture::{Board, Camera, Distortion, Image, Intrinsics};
+use capture::{Board, Camera, Distortion, Image, Intrinsics, Ray};
 use nalgebra::{Isometry3, Matrix3, Point2, Point3, Rotation3, Unit, Vector2, Vector3};
 use rayon::prelude::*;
 
@@ -19,6 +19,10 @@ pub struct Cartoon {
     pub cloth: [u8; 3],
     /// Colour of the lower and the upper ball.
     pub balls: [[u8; 3]; 2],
+    /// Whether there is a platter with the board; else the balls hang before the cloth.
+    pub has_platter: bool,
+    /// Column, row and radius in pixels of a black mirror ball that stands in the room.
+    pub mirror: Option<[f64; 3]>,
 }
 
 /// Two balls one upon the other: centres and radii in metres.
@@ -29,6 +33,10 @@ const PLATTER: f64 = 0.16;
 const RAYS: usize = 3;
 /// Towards the only lamp of the room, seen by the camera.
 const LAMP: [f64; 3] = [-0.5, -0.7, -0.5];
+/// Cosine of half the angle under which the mirror ball sees it.
+const LAMP_COSINE: f64 = 0.995;
+/// Of the mirror ball from the camera, metres: nearer than anything else.
+const MIRROR_DISTANCE: f64 = 0.25;
 
 impl Default for Cartoon {
     fn default() -> Self {
@@ -45,6 +53,8 @@ impl Default for Cartoon {
             elevation_deg: 30.0,
             cloth: [40, 160, 60],
             balls: [[200, 90, 60], [210, 190, 80]],
+            has_platter: true,
+            mirror: None,
         }
     }
 }
@@ -95,6 +105,35 @@ impl Cartoon {
         Camera { intrinsics: self.lens(), rotation: turned, translation: -(rotation * centre) }
     }
 
+    /// Unit direction in the camera's coordinates towards the lamp.
+    pub fn lamp(&self) -> Unit<Vector3<f64>> {
+        Unit::new_normalize(LAMP.into())
+    }
+
+    /// The set without object and platter.
+    pub fn set(&self) -> Image<[u8; 3]> {
+        let [width, height] = self.size;
+        let cloth = |at: usize| self.backdrop((at / width) as f64 + 0.5).map(|level| level.round() as u8);
+        Image::from_pixels(width, height, (0..width * height).map(cloth).collect()).unwrap_or_default()
+    }
+
+    /// A cloth that is lighter above.
+    fn backdrop(&self, row: f64) -> [f64; 3] {
+        let light = 1.1 - 0.3 * row / self.size[1] as f64;
+        self.cloth.map(|c| f64::from(c) * light)
+    }
+
+    /// What the mirror ball shows along a ray, if it is met.
+    fn mirrored(&self, camera: &Camera, ray: &Ray, lamp: &Unit<Vector3<f64>>) -> Option<[f64; 3]> {
+        let [column, row, radius] = self.mirror?;
+        let towards = camera.ray(Point2::new(column, row))?;
+        let centre = towards.origin + towards.direction * MIRROR_DISTANCE;
+        let radius = MIRROR_DISTANCE * (radius / camera.intrinsics.fx).atan().sin();
+        let normal = (ray.origin + ray.direction * hit(ray, centre, radius)? - centre) / radius;
+        let reflected = ray.direction - 2.0 * ray.direction.dot(&normal) * normal;
+        Some(if reflected.dot(lamp) > LAMP_COSINE { [255.0; 3] } else { [22.0, 20.0, 24.0] })
+    }
+
     /// The frame at which the platter has turned by `angle` radians.
     pub fn frame(&self, angle: f64) -> Drawn {
         let camera = self.camera(angle);
@@ -143,12 +182,11 @@ impl Cartoon {
         pixel: Point2<f64>,
     ) -> ([f64; 3], bool) {
         let Some(ray) = camera.ray(pixel) else { return ([0.0; 3], false) };
-        let hits = BALLS.iter().enumerate().filter_map(|(i, &(centre, radius))| {
-            let offset = ray.origin - Point3::from(centre);
-            let along = offset.dot(&ray.direction);
-            let root = along * along - offset.norm_squared() + radius * radius;
-            (root > 0.0).then(|| (-along - root.sqrt(), i))
-        });
+        if let Some(colour) = self.mirrored(camera, &ray, lamp) {
+            return (colour, false);
+        }
+        let balls = BALLS.iter().enumerate();
+        let hits = balls.filter_map(|(i, &(centre, radius))| Some((hit(&ray, centre.into(), radius)?, i)));
         if let Some((distance, ball)) = hits.min_by(|a, b| a.0.total_cmp(&b.0)) {
             let point = ray.origin + ray.direction * distance;
             let normal = (point - Point3::from(BALLS[ball].0)) / BALLS[ball].1;
@@ -158,7 +196,7 @@ impl Cartoon {
             return (self.balls[ball].map(|c| f64::from(c) * light * stripes), true);
         }
         let on_plane = ray.origin - ray.direction * (ray.origin.z / ray.direction.z);
-        if ray.direction.z < 0.0 && on_plane.coords.norm() < PLATTER {
+        if self.has_platter && ray.direction.z < 0.0 && on_plane.coords.norm() < PLATTER {
             let [width, height] = self.board.size();
             let place = board_from_world * on_plane;
             let is_card = (-0.006..width + 0.006).contains(&place.x) && (-0.006..height + 0.006).contains(&place.y);
@@ -169,10 +207,16 @@ impl Cartoon {
             };
             return ([level; 3], false);
         }
-        // A cloth that is lighter above.
-        let light = 1.1 - 0.3 * pixel.y / self.size[1] as f64;
-        (self.cloth.map(|c| f64::from(c) * light), false)
+        (self.backdrop(pixel.y), false)
     }
+}
+
+/// How far along a ray a ball is met.
+fn hit(ray: &Ray, centre: Point3<f64>, radius: f64) -> Option<f64> {
+    let offset = ray.origin - centre;
+    let along = offset.dot(&ray.direction);
+    let root = along * along - offset.norm_squared() + radius * radius;
+    (root > 0.0).then(|| -along - root.sqrt())
 }
 
 /// Levels of 8 bits to light and back; pixels average light. A power of 2.2 is near enough.

@@ -19,8 +19,13 @@ fn angles(frames: usize, turns: f64) -> Vec<f64> {
 }
 
 fn write_film(path: &Path, frames: &[Image<[u8; 3]>]) {
+    write_film_of(path, frames, WriteOptions::default().fps);
+}
+
+/// With so many frames a second.
+fn write_film_of(path: &Path, frames: &[Image<[u8; 3]>], fps: f64) {
     let size = [frames[0].width(), frames[0].height()];
-    let mut film = FilmWriter::create(path, size, &WriteOptions::default()).expect("a codec");
+    let mut film = FilmWriter::create(path, size, &WriteOptions { fps, ..WriteOptions::default() }).expect("a codec");
     frames.iter().for_each(|frame| film.push(frame).expect("a frame"));
     film.finish().expect("a film");
 }
@@ -212,8 +217,8 @@ fn a_camera_that_was_knocked_stands_in_two_places() {
     drawn.extend(draw(&knocked, &angles[20..]));
     let (_folder, path) = film_of(&images(&drawn));
     let found = captured(&path, &FootageOptions { most: Some(12), ..FootageOptions::default() });
-    assert_eq!(found.shots.standpoints().len(), 2, "{:?}", found.shots.findings);
-    assert!(found.shots.standpoints()[1].first.abs_diff(20) <= 1);
+    assert_eq!(found.shots.standpoints.len(), 2, "{:?}", found.shots.findings);
+    assert!(found.shots.turntable().expect("a turntable").segments[1].first.abs_diff(20) <= 1);
     assert!(found.shots.findings.iter().any(|f| f.contains("20") && f.contains("moved")), "{:?}", found.shots.findings);
 }
 
@@ -253,7 +258,7 @@ fn two_films_from_two_heights_tell_the_lens() {
     println!("{lens:?}, true {:?}; {} kept", low.lens(), found.kept.len());
     assert!((lens.fx / low.lens().fx - 1.0).abs() < 0.003, "{}", lens.fx);
     assert!((lens.cx - low.lens().cx).abs() < 2.0 && (lens.cy - low.lens().cy).abs() < 2.0, "{lens:?}");
-    assert_eq!(found.shots.standpoints().len(), 2);
+    assert_eq!(found.shots.standpoints.len(), 2);
     // Both rings are kept.
     assert_eq!(found.selected.rings.len(), 2);
     assert!(found.kept.len() > 40, "{}", found.kept.len());
@@ -325,6 +330,152 @@ fn masks_and_cameras_from_elsewhere_go_by_name() {
     std::fs::remove_file(masks.join("0007.png")).expect("removed");
     let run = turnlight(folder.path(), &args);
     assert!(run.code == Some(1) && run.stderr.contains("0007.png"), "{}", run.stderr);
+}
+
+/// The report of a run with `--json`, and the capture it wrote.
+fn done(folder: &Path, args: &[&str], output: &str) -> (serde_json::Value, capture::Capture) {
+    let run = turnlight(folder, &[&["capture", "--json"][..], args, &["-o", output]].concat());
+    assert_eq!(run.code, Some(0), "{args:?}: {}", run.stderr);
+    let report = serde_json::from_str(&run.stdout).expect("JSON");
+    (report, capture::Capture::read(&folder.join(output)).expect("a capture"))
+}
+
+/// Position in the footage of every frame in the capture, in their order there.
+fn positions(report: &serde_json::Value) -> Vec<usize> {
+    let frames = report["frames"].as_array().expect("frames").iter().enumerate();
+    let mut kept: Vec<(u64, usize)> = frames.filter_map(|(at, f)| Some((f["kept"].as_u64()?, at))).collect();
+    kept.sort_unstable();
+    kept.into_iter().map(|(_, at)| at).collect()
+}
+
+/// Of the masks written with the truth, in the mean.
+fn written_iou(report: &serde_json::Value, capture: &capture::Capture, drawn: &[Drawn]) -> f64 {
+    let positions = positions(report);
+    assert_eq!(positions.len(), capture.frames.len());
+    let mask = |frame: &capture::Frame| capture::read_matte(frame.mask_path.as_ref().expect("a mask")).expect("read");
+    let ious = capture.frames.iter().zip(&positions).map(|(frame, &at)| iou(&mask(frame), &drawn[at].matte));
+    ious.sum::<f64>() / positions.len() as f64
+}
+
+#[test]
+fn what_is_said_of_a_film_is_heeded() {
+    let cartoon = Cartoon { mirror: Some([90.0, 80.0, 40.0]), ..Cartoon::default() };
+    let drawn = draw(&cartoon, &angles(24, 0.96));
+    let (folder, path) = film_of(&images(&drawn));
+    let (place, waved) = (folder.path(), folder.path().join("waved"));
+    std::fs::create_dir(&waved).expect("made");
+    for (k, elevation_deg) in [25.0, 33.0, 41.0, 49.0, 57.0, 65.0, 73.0, 80.0].into_iter().enumerate() {
+        let tilted = Cartoon { elevation_deg, mirror: None, ..cartoon.clone() };
+        capture::write_rgb(&waved.join(format!("{k}.png")), &tilted.frame(0.7 * k as f64).image).expect("written");
+    }
+    capture::write_rgb(&place.join("set.png"), &cartoon.set()).expect("written");
+    let said = ["film.mp4", "--square", "30mm", "--calibration", "waved", "--clean-plate", "set.png"];
+    let more = ["--light-ball", "92,79,38", "--frames", "12", "--model", "owl.glb"];
+    let (report, captured) = done(place, &[&said[..], &more].concat(), "owl");
+    // --square: metres.
+    assert_eq!((captured.unit, &report["unit"]), (Some(1.0), &serde_json::json!(1.0)));
+    let distance = (captured.frames[0].camera.center() - nalgebra::Point3::new(0.0, 0.0, 0.03)).norm();
+    assert!((distance / 0.5 - 1.0).abs() < 0.01, "{distance}");
+    // --calibration: the lens is that of the other shots, and held.
+    assert_eq!(report["lens"]["source"], "separate shots of a board");
+    let focal = captured.frames[0].camera.intrinsics.fx;
+    assert!((focal / cartoon.lens().fx - 1.0).abs() < 0.005, "{focal}");
+    assert!(report["lens"]["focal_px"][0]["deviation"].is_null(), "{}", report["lens"]);
+    // --clean-plate.
+    let mean = written_iou(&report, &captured, &drawn);
+    println!("distance {distance:.4}, focal {focal:.2}, IoU {mean:.4}");
+    assert!(mean > 0.96, "{mean}");
+    // --light-ball: the lamp stands still before the camera.
+    assert!((10..=12).contains(&captured.frames.len()));
+    for frame in &captured.frames {
+        let found = frame.light_direction.expect("a direction");
+        let off = (frame.camera.rotation * found).angle(&cartoon.lamp()).to_degrees();
+        assert!(off < 2.0, "{off}°");
+    }
+    // --model.
+    let model = turnlight(place, &["info", "owl.glb", "--json"]);
+    assert_eq!(model.code, Some(0), "{}", model.stderr);
+    // A plate of another set.
+    capture::write_rgb(&place.join("black.png"), &Image::filled(640, 480, [0; 3])).expect("written");
+    let run = turnlight(place, &["capture", "film.mp4", "--clean-plate", "black.png", "--frames", "8", "-o", "black"]);
+    assert_eq!(run.code, Some(1), "{}", run.stdout);
+    assert!(run.stderr.contains("black.png") && run.stderr.contains("leave --clean-plate away"), "{}", run.stderr);
+    assert!(!place.join("black").exists() && path.is_file());
+}
+
+/// A program in the place of COLMAP, which finds the cameras of the frames drawn and keeps the masks it gets in `seen`.
+#[cfg(unix)]
+fn stand_in(place: &Path, drawn: &[Drawn]) {
+    use std::os::unix::fs::PermissionsExt;
+    let model = place.join("model");
+    std::fs::create_dir(&model).expect("made");
+    let lens = drawn[0].camera.intrinsics;
+    let d = lens.distortion;
+    let [w, h] = [lens.width, lens.height];
+    let camera = format!("1 OPENCV {w} {h} {} {} {} {} {} {} 0 0\n", lens.fx, lens.fy, lens.cx, lens.cy, d.k1, d.k2);
+    let image = |(k, frame): (usize, &Drawn)| {
+        let turn = nalgebra::Rotation3::from_matrix_unchecked(frame.camera.rotation);
+        let (q, t) = (nalgebra::UnitQuaternion::from_rotation_matrix(&turn), frame.camera.translation);
+        format!("{} {} {} {} {} {} {} {} 1 {k:06}.png\n\n", k + 1, q.w, q.i, q.j, q.k, t.x, t.y, t.z)
+    };
+    std::fs::write(model.join("cameras.txt"), camera).expect("written");
+    let images: String = drawn.iter().enumerate().map(image).collect();
+    std::fs::write(model.join("images.txt"), images).expect("written");
+    // feature_extractor --database_path D --image_path I …, mapper --database_path D --image_path I --output_path O
+    let script = format!(
+        "#!/bin/sh\ncase \"$1 $2\" in *' -h') ;; 'feature_extractor '*) cp -r $5/../masks {seen} ;;\n\
+         'mapper '*) cp -r {model} $7/0 ;; esac\n",
+        seen = place.join("seen").display(),
+        model = model.display()
+    );
+    let program = place.join("colmap");
+    std::fs::write(&program, script).expect("written");
+    std::fs::set_permissions(&program, std::fs::Permissions::from_mode(0o755)).expect("executable");
+}
+
+#[cfg(unix)]
+#[test]
+fn a_film_without_a_board_takes_cameras_from_elsewhere() {
+    let cartoon = Cartoon { has_platter: false, ..Cartoon::default() };
+    let drawn = draw(&cartoon, &(0..24).map(|k| TAU / 24.0 * k as f64).collect::<Vec<_>>());
+    let folder = tempfile::tempdir().expect("a folder");
+    let place = folder.path();
+    write_film_of(&place.join("film.mp4"), &images(&drawn), 6.0);
+    stand_in(place, &drawn);
+    let (report, captured) = done(place, &["film.mp4", "--colmap", "./colmap"], "found");
+    let mean = written_iou(&report, &captured, &drawn);
+    println!("COLMAP: {} frames, IoU {mean:.4}", captured.frames.len());
+    assert!(captured.frames.len() >= 20 && mean > 0.95, "{} {mean}", captured.frames.len());
+    // COLMAP saw the object and not the room.
+    let seen = capture::read_matte(&place.join("seen/000005.png.png")).expect("a mask");
+    let (object, room) = (&drawn[5].matte, |at: usize| seen.pixels()[at] < 128);
+    let of_room = (0..object.pixels().len()).filter(|&at| object.pixels()[at] == 0);
+    let (hidden, all) = of_room.fold((0, 0), |(hidden, all), at| (hidden + usize::from(room(at)), all + 1));
+    assert!(hidden * 100 > all * 95, "{hidden} of {all} pixels of the room are masked");
+    assert!(iou(&seen, object) > 0.5, "{}", iou(&seen, object));
+    // A capture of the film has the cameras of its frames, by its report: some are left out of it.
+    let (report, captured) = done(place, &["film.mp4", "--cameras", "found", "--frames", "9"], "again");
+    assert_eq!(captured.frames.len(), 9);
+    for (frame, at) in captured.frames.iter().zip(positions(&report)) {
+        assert!((frame.camera.center() - drawn[at].camera.center()).norm() < 1e-6);
+    }
+    // The first of them and an even turn of 15° a sixth of a second.
+    let refused = turnlight(place, &["capture", "film.mp4", "--step", "90", "-o", "even"]);
+    assert_eq!(refused.code, Some(2), "a step and no camera: {}", refused.stderr);
+    let (report, captured) = done(place, &["film.mp4", "--cameras", "found", "--step", "90"], "even");
+    for (frame, at) in captured.frames.iter().zip(positions(&report)) {
+        let off = (frame.camera.center() - drawn[at].camera.center()).norm();
+        assert!(off < 2e-3, "{at}: {off}");
+    }
+    let mean = written_iou(&report, &captured, &drawn);
+    println!("even turn: {} frames, IoU {mean:.4}", captured.frames.len());
+    assert!(captured.frames.len() >= 20 && mean > 0.95, "{} {mean}", captured.frames.len());
+    assert!(report["coverage"]["is_closed"] == true && report["motion"] == "turntable", "{}", report["coverage"]);
+    assert!(report["findings"].to_string().contains("taken to turn evenly, by 90° a second"), "{}", report["findings"]);
+    // A capture of something else.
+    let stranger = tests::small_capture(place, 2);
+    let run = turnlight(place, &["capture", "film.mp4", "--cameras", &stranger.to_string_lossy(), "-o", "none"]);
+    assert!(run.code == Some(1) && run.stderr.contains("film.mp4: is 640x480"), "{}", run.stderr);
 }
 
 /// Where box `name` of an .mp4 starts, inside the boxes before it (ISO 14496-12).

@@ -519,10 +519,22 @@ pub(crate) struct CaptureFootageArgs {
     /// What moved [default: found out]
     #[arg(long, value_enum, conflicts_with = "cameras")]
     pub(crate) motion: Option<MotionArg>,
-    /// Take the cameras of photographs from this calibrated folder of any known kind, by name
+    /// Take the cameras from this calibrated folder of any known kind: by the names of photographs, by the numbers of a
+    /// film's frames, counted from 0, or as a capture made of this film before has them
     #[arg(long, value_name = "CAPTURE")]
     pub(crate) cameras: Option<PathBuf>,
-    /// Have an installed COLMAP find the cameras of photographs, without a board; give masks where the object turned
+    /// Of --cameras take the first alone, for a camera that stands still, and turn the table evenly by this angle in
+    /// degrees: from photograph to photograph, or in a second of a film
+    #[arg(long, value_name = "DEG", requires = "cameras", value_parser = step, allow_negative_numbers = true)]
+    pub(crate) step: Option<f64>,
+    /// Direction of the axis, about which the object turns right-handed: x, y, z, -x, -y, -z or X,Y,Z [default: z]
+    #[arg(long, value_name = "AXIS", requires = "step", value_parser = direction, allow_hyphen_values = true)]
+    pub(crate) axis: Option<[f64; 3]>,
+    /// A point on the axis, in the units of the camera [default: 0,0,0]
+    #[arg(long, value_name = "X,Y,Z", requires = "step", value_parser = vector, allow_hyphen_values = true)]
+    pub(crate) point: Option<[f64; 3]>,
+    /// Have an installed COLMAP find the cameras, without a board, on what moves before a camera that stands still, or
+    /// on the masks given
     #[arg(long, value_name = "PROGRAM", num_args = 0..=1, default_missing_value = "colmap", conflicts_with_all = ["cameras", "board", "square", "calibration", "motion"])]
     pub(crate) colmap: Option<PathBuf>,
     /// Take silhouettes from this folder: NAME.png of a photograph, the frame's number, counted from 0, of a film

@@ -8,7 +8,7 @@ mod stills;
 use crate::{CaptureError, Image, pixels};
 use std::path::{Path, PathBuf};
 
-pub use stills::read_upright;
+pub use stills::{read_upright, read_upright_alpha};
 
 /// Focal lengths noted that differ by less, in parts of them, are one.
 const SAME_FOCAL: f64 = 0.01;

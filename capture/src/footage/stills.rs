@@ -12,7 +12,15 @@ const FILMS: [&str; 7] = ["mp4", "mov", "m4v", "avi", "mkv", "webm", "mts"];
 /// # Errors
 /// When the file is missing, truncated or of an unknown kind.
 pub fn read_upright(path: &Path) -> Result<Image<[u8; 3]>, CaptureError> {
-    pixels::read_rgb_upright(path)
+    Ok(pixels::read_rgb_and_alpha_upright(path)?.0)
+}
+
+/// Reads the alpha channel of a photograph as a matte, turned as [`read_upright`] does; 255 everywhere without one.
+///
+/// # Errors
+/// As [`read_upright`].
+pub fn read_upright_alpha(path: &Path) -> Result<Image<u8>, CaptureError> {
+    Ok(pixels::read_rgb_and_alpha_upright(path)?.1)
 }
 
 pub(super) fn is_photograph(path: &Path) -> bool {

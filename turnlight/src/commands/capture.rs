@@ -3,12 +3,14 @@
 use super::check_extension;
 use crate::Answer;
 use crate::arguments::{CaptureFootageArgs, MotionArg};
+use nalgebra::{Unit, Vector3};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 use turnlight::capture::calibrate::MotionKind;
 use turnlight::capture::footage::Footage;
+use turnlight::capture::turntable::Axis;
 use turnlight::capture::{Capture, LoadOptions};
-use turnlight::footage::{CameraSource, FootageOptions, capture_footage};
+use turnlight::footage::{CameraSource, EvenTurn, FootageOptions, capture_footage};
 use turnlight::pipeline::ShapeOptions;
 use turnlight::stages::{Observer, Stages};
 use turnlight::texture::{FitOptions, Method};
@@ -64,14 +66,23 @@ fn options(args: &CaptureFootageArgs) -> Result<FootageOptions, Error> {
             MotionArg::Turntable => MotionKind::Turntable,
             MotionArg::FreeHand => MotionKind::FreeHand,
         }),
-        cameras: match (&args.cameras, &args.colmap) {
-            (Some(path), _) => CameraSource::Calibrated(path.clone()),
-            (None, Some(program)) => CameraSource::Colmap(program.clone()),
-            (None, None) => CameraSource::Board,
-        },
+        cameras: cameras(args),
         masks: args.masks.clone(),
         clean_plates: args.clean_plate.clone(),
         light_ball: args.light_ball,
         most: args.frames,
     })
+}
+
+fn cameras(args: &CaptureFootageArgs) -> CameraSource {
+    match (&args.cameras, args.step, &args.colmap) {
+        (Some(path), Some(step), _) => {
+            let direction = Unit::new_normalize(args.axis.map_or(Vector3::z(), Vector3::from));
+            let axis = Axis { point: args.point.unwrap_or_default().into(), direction };
+            CameraSource::Turning(EvenTurn { camera: path.clone(), axis, step: step.to_radians() })
+        }
+        (Some(path), None, _) => CameraSource::Calibrated(path.clone()),
+        (None, _, Some(program)) => CameraSource::Colmap(program.clone()),
+        (None, _, None) => CameraSource::Board,
+    }
 }

@@ -1,17 +1,18 @@
 //! Cameras from a board in the footage.
 
-use super::{FootageOptions, Shot, Shots};
+use super::shots::lens_note;
+use super::{FootageOptions, Shot, Shots, Standpoint};
 use crate::Error;
 use crate::stages::Stages;
+use capture::Board;
 use capture::calibrate::{
-    CalibrateOptions, Calibration, FramePose, LensKnowledge, Motion, MotionKind, Sighting, Standing, Target, Turntable,
-    calibrate,
+    CalibrateOptions, Calibration, FramePose, LensKnowledge, Motion, MotionKind, Segment, Sighting, Standing, Target,
+    Turntable, calibrate,
 };
 use capture::choose::PoseSource;
 use capture::footage::Footage;
 use capture::silhouette::Print;
 use capture::video::{Observations, Observed, Pattern, observe, recognise_in_footage};
-use capture::{Board, Intrinsics};
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, UnitQuaternion, Vector3};
 
 /// Corners that tell a camera: a homography needs four, and two more show that it is right.
@@ -50,6 +51,7 @@ pub(super) fn find_cameras(
             // Of a grid of markers there may be the rim alone, and of a chessboard nothing below the object.
             Pattern::Board(_) | Pattern::Markers(_) => None,
         },
+        standpoints: standpoints(&calibration),
         calibration: Some(calibration),
         told_by,
         unit: is_measured.then_some(1.0),
@@ -165,7 +167,7 @@ fn lens(
     let sightings = sightings(&seen);
     let found = stages.run("calibrate lens", |_| calibrate(&target(&pattern, options), &sightings, &calibrate_options));
     let calibration = found.map_err(|fault| Error::Failed(format!("{}: {fault}", shots.path().display())))?;
-    stages.observer().noted(&lens_note(&calibration.intrinsics, calibration.rms_px));
+    stages.observer().noted(&lens_note(&calibration));
     calibration.findings.iter().for_each(|finding| stages.observer().noted(finding));
     if let Some(fault) = &seen.fault {
         stages.observer().noted(&format!("the calibration shots are used as far as they go: {fault}"));
@@ -178,10 +180,6 @@ fn noted_lens(footage: &Footage, size: [usize; 2], stages: &Stages<'_>) -> LensK
     let Some(focal) = footage.noted_focal_px(size) else { return LensKnowledge::Unknown };
     stages.observer().noted(&format!("the camera noted a focal length of about {focal:.0} px"));
     LensKnowledge::Guess(focal)
-}
-
-fn lens_note(lens: &Intrinsics, rms_px: f64) -> String {
-    format!("lens: f {:.1} px, centre ({:.1}, {:.1}), {rms_px:.2} px RMS", lens.fx, lens.cx, lens.cy)
 }
 
 fn target(pattern: &Pattern, options: &FootageOptions) -> Target {
@@ -233,21 +231,19 @@ fn shots(seen: &Observations, calibration: &Calibration) -> Vec<Shot> {
     seen.frames.iter().enumerate().map(shot).collect()
 }
 
+/// Where the camera stood, one place for each part of the motion.
+fn standpoints(calibration: &Calibration) -> Vec<Standpoint> {
+    let Motion::Turntable(turntable) = &calibration.motion else { return Vec::new() };
+    let standpoint = |segment: &Segment| {
+        let centre = segment.pose.inverse().translation.vector;
+        Standpoint { take: segment.film, azimuth: Some(centre.y.atan2(centre.x)) }
+    };
+    turntable.segments.iter().map(standpoint).collect()
+}
+
 fn bare(frame: &Observed) -> Shot {
-    Shot {
-        source: frame.source.clone(),
-        sharpness: frame.sharpness,
-        blur_px: frame.blur_px,
-        motion: frame.motion,
-        camera: None,
-        pose: PoseSource::Missing,
-        angle: None,
-        angle_deviation: None,
-        standpoint: None,
-        corners: 0,
-        rms_px: 0.0,
-        fault: None,
-    }
+    let (blur_px, motion) = (frame.blur_px, frame.motion);
+    Shot { blur_px, motion, ..Shot::bare(frame.source.clone(), frame.sharpness) }
 }
 
 fn sighted(frame: &Observed, sighting: usize, pose: &FramePose, turntable: Option<&Turntable>) -> Shot {

@@ -1,41 +1,63 @@
 //! Where the cameras of footage come from: a board in it, or elsewhere.
 
-use super::{FootageOptions, Shot, Shots, silhouettes};
+use super::look::look;
+use super::pictures::Taken;
+use super::{FootageOptions, Shot, Shots, Standpoint, by_colmap};
 use crate::Error;
-use crate::colmap::{self, ColmapOptions, Photograph};
 use crate::stages::Stages;
-use capture::choose::{self, PoseSource};
-use capture::footage::{Footage, FrameSource, read_upright};
+use capture::choose::PoseSource;
+use capture::footage::{Footage, FrameSource};
+use capture::turntable::{Axis, turned_camera};
 use capture::{Camera, Capture};
-use rayon::prelude::*;
+use nalgebra::{Point3, Rotation3, Vector3};
+use serde::Deserialize;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// Where the cameras come from.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub enum CameraSource {
     /// A board in the footage.
     #[default]
     Board,
-    /// A calibrated folder of any known kind, whose frames have the names of the photographs.
+    /// A calibrated folder of any known kind, whose frames have the names of the photographs, or the numbers of the film's
+    /// frames, counted from 0; or a capture made of this film before.
     Calibrated(PathBuf),
-    /// An installed COLMAP, by name or path, on the photographs and the masks given with them.
+    /// One camera that stands still, and a table that turns evenly.
+    Turning(EvenTurn),
+    /// An installed COLMAP, by name or path, on what moves before a camera that stands still, or on the masks given.
     Colmap(PathBuf),
 }
 
-/// Finds the frames of the footage and their cameras.
+/// A table that turns evenly before one camera.
+#[derive(Clone, Debug, PartialEq)]
+pub struct EvenTurn {
+    /// A calibrated folder of any known kind, whose first camera is that of the first frame.
+    pub camera: PathBuf,
+    /// In the world of that camera.
+    pub axis: Axis,
+    /// Radians from photograph to photograph; of a film, a second.
+    pub step: f64,
+}
+
+/// Finds the frames of the footage and their cameras; and the pictures of some, where they were needed for that and written
+/// beside the place of the `output`.
 ///
 /// # Errors
 /// Where the footage cannot be read, shows no board, or its cameras cannot be told.
 pub(super) fn find_cameras(
     footage: &Footage,
     options: &FootageOptions,
+    output: &Path,
     stages: &mut Stages<'_>,
-) -> Result<Shots, Error> {
-    match &options.cameras {
-        CameraSource::Board => by_board(footage, options, stages),
-        CameraSource::Calibrated(path) => calibrated(footage, path, stages),
-        CameraSource::Colmap(program) => by_colmap(footage, program, options, stages),
-    }
+) -> Result<(Shots, Option<Taken>), Error> {
+    let shots = match &options.cameras {
+        CameraSource::Board => by_board(footage, options, stages)?,
+        CameraSource::Calibrated(path) => calibrated(footage, path, stages)?,
+        CameraSource::Turning(turn) => turning(footage, turn, stages)?,
+        CameraSource::Colmap(program) => return by_colmap::find_cameras(footage, program, options, output, stages),
+    };
+    Ok((shots, None))
 }
 
 #[cfg(feature = "video")]
@@ -44,95 +66,48 @@ use super::by_board::find_cameras as by_board;
 /// Boards are found by OpenCV.
 #[cfg(not(feature = "video"))]
 fn by_board(footage: &Footage, _: &FootageOptions, _: &mut Stages<'_>) -> Result<Shots, Error> {
-    Err(Error::Failed(format!(
+    Err(needs_video(footage))
+}
+
+#[cfg(not(feature = "video"))]
+pub(super) fn needs_video(footage: &Footage) -> Error {
+    Error::Failed(format!(
         "{}: this turnlight was built without films and boards; give the cameras of photographs with --cameras, or \
          install libopencv-dev, clang and libclang-dev and build with --features video",
         footage.path().display()
-    )))
+    ))
 }
 
-/// Photographs whose cameras were told elsewhere.
+impl Shot {
+    /// Gives a frame its camera, where there is one.
+    pub(super) fn set_camera(&mut self, camera: Option<Camera>) {
+        self.camera = camera;
+        self.pose = if camera.is_some() { PoseSource::Measured } else { PoseSource::Missing };
+    }
+}
+
+/// Frames whose cameras were told elsewhere: of every photograph, of a film of any frames.
 fn calibrated(footage: &Footage, path: &Path, stages: &mut Stages<'_>) -> Result<Shots, Error> {
     let capture = Capture::read(path)?;
-    let sources = photographs(footage)?;
-    refuse_twins(&sources)?;
-    let cameras = sources.iter().map(|source| camera_of(source, &capture, path)).collect::<Result<Vec<_>, _>>()?;
-    let cameras = cameras.into_iter().map(Some).collect();
-    let shots = photographed(sources, cameras, format!("cameras of {}", path.display()), stages)?;
-    Ok(Shots { unit: capture.unit, ..shots })
-}
-
-/// Photographs whose cameras COLMAP finds. What stands still while the object turns has to be masked.
-fn by_colmap(
-    footage: &Footage,
-    program: &Path,
-    options: &FootageOptions,
-    stages: &mut Stages<'_>,
-) -> Result<Shots, Error> {
-    let sources = photographs(footage)?;
-    if options.masks.is_none() {
-        let note = "no masks: COLMAP sees the room, which is right only if the camera was carried (otherwise --masks)";
-        stages.observer().noted(note);
+    refuse_twins(&footage.photographs())?;
+    let size = capture.frames.first().map(|frame| [frame.camera.intrinsics.width, frame.camera.intrinsics.height]);
+    let mut shots = look(footage, size, stages)?;
+    let (takes, numbered) = (shots.takes(), FilmCameras::of(&capture, path)?);
+    for shot in &mut shots.shots {
+        let camera = match shot.source.file {
+            Some(_) => Some(camera_of(&shot.source, &capture, path)?),
+            None => numbered.of_frame(&shot.source, takes),
+        };
+        shot.set_camera(camera);
     }
-    let photograph = |source: &FrameSource| {
-        let takes = footage.takes.len();
-        let mask = options.masks.as_ref().map(|folder| silhouettes::mask_of(folder, source, takes)).transpose()?;
-        Ok(Photograph { image: source.file.clone().unwrap_or_default(), mask })
-    };
-    let pictures = sources.iter().map(photograph).collect::<Result<Vec<_>, Error>>()?;
-    let colmap = ColmapOptions { program: program.to_owned(), ..ColmapOptions::default() };
-    let found = colmap::find_cameras(&pictures, &colmap, stages)?;
-    let mut shots = photographed(sources, found.cameras, "COLMAP".to_owned(), stages)?;
-    if found.models > 1 {
-        let fault = format!("the photographs fell apart into {} groups, of which the largest is used", found.models);
-        shots.findings.push(format!("{fault}: take more between them"));
+    if shots.shots.iter().all(|shot| shot.camera.is_none()) {
+        let (film, cameras) = (footage.path().display(), path.display());
+        let fault = format!("{film}: {cameras} has a camera for none of its {} frames", shots.shots.len());
+        let remedy = "name the pictures there by the numbers of the frames, counted from 0 (0012.png), give a capture made of \
+                      this film, or one camera and how the table turns (--step)";
+        return Err(Error::Failed(format!("{fault}; {remedy}")));
     }
-    Ok(shots)
-}
-
-fn photographed(
-    sources: Vec<FrameSource>,
-    cameras: Vec<Option<Camera>>,
-    told_by: String,
-    stages: &mut Stages<'_>,
-) -> Result<Shots, Error> {
-    let size = cameras.iter().flatten().next().map_or([0, 0], |c| [c.intrinsics.width, c.intrinsics.height]);
-    let look = |source: &FrameSource| {
-        let Some(file) = &source.file else { return Ok(0.0) };
-        let image = read_upright(file)?;
-        silhouettes::check_size(file, [image.width(), image.height()], size)?;
-        Ok(choose::sharpness(&image))
-    };
-    let sharpness: Vec<Result<f64, Error>> = stages.run("look", |_| sources.par_iter().map(look).collect());
-    let mut shots = Vec::new();
-    for ((source, camera), sharpness) in sources.into_iter().zip(cameras).zip(sharpness) {
-        shots.push(Shot {
-            source,
-            sharpness: sharpness?,
-            blur_px: None,
-            motion: 0.0,
-            camera,
-            pose: if camera.is_some() { PoseSource::Measured } else { PoseSource::Missing },
-            angle: None,
-            angle_deviation: None,
-            standpoint: None,
-            corners: 0,
-            rms_px: 0.0,
-            fault: None,
-        });
-    }
-    let has_plane = false;
-    let (findings, notes) = (Vec::new(), Vec::new());
-    Ok(Shots { shots, size, calibration: None, print: None, told_by, unit: None, has_plane, findings, notes })
-}
-
-/// The frames of footage that is photographs alone.
-fn photographs(footage: &Footage) -> Result<Vec<FrameSource>, Error> {
-    if footage.has_film() {
-        let fault = "cameras from elsewhere are given by the names of photographs, and this is a film";
-        return Err(Error::Arguments(format!("{}: {fault}; give its frames as a folder", footage.path().display())));
-    }
-    Ok(footage.photographs())
+    Ok(Shots { told_by: format!("cameras of {}", path.display()), unit: capture.unit, ..shots })
 }
 
 /// Photographs of the same name cannot be told apart by it.
@@ -156,4 +131,96 @@ fn camera_of(source: &FrameSource, capture: &Capture, path: &Path) -> Result<Cam
         let fault = format!("{}: {} has no camera of this name", source.name, path.display());
         Error::Failed(format!("{fault}; leave the photograph out, or add its camera"))
     })
+}
+
+/// Cameras of frames of films.
+enum FilmCameras {
+    /// By what the report of a capture of ours calls the frames: its pictures are numbered as they follow in it.
+    Reported(BTreeMap<String, Camera>),
+    /// By folder and number in the names of the pictures.
+    Numbered(BTreeMap<(String, usize), Camera>),
+}
+
+/// As much of `report.json` as says which frame became which picture.
+#[derive(Deserialize)]
+struct Report {
+    frames: Vec<ReportedFrame>,
+}
+
+#[derive(Deserialize)]
+struct ReportedFrame {
+    name: String,
+    kept: Option<usize>,
+}
+
+impl FilmCameras {
+    fn of(capture: &Capture, path: &Path) -> Result<Self, Error> {
+        let file = path.join("report.json");
+        if let Ok(text) = std::fs::read_to_string(&file) {
+            let report: Report = serde_json::from_str(&text).map_err(|fault| {
+                Error::Failed(format!("{}: is no report of a capture ({fault}); remove it", file.display()))
+            })?;
+            let camera = |frame: ReportedFrame| Some((frame.name, capture.frames.get(frame.kept?)?.camera));
+            return Ok(Self::Reported(report.frames.into_iter().filter_map(camera).collect()));
+        }
+        let name = |part: Option<&std::ffi::OsStr>| part.map(|s| s.to_string_lossy().into_owned());
+        let camera = |frame: &capture::Frame| {
+            let number = name(frame.image_path.file_stem())?.parse().ok()?;
+            Some(((name(frame.image_path.parent()?.file_name()).unwrap_or_default(), number), frame.camera))
+        };
+        Ok(Self::Numbered(capture.frames.iter().filter_map(camera).collect()))
+    }
+
+    /// Of several takes each has a folder of its name.
+    fn of_frame(&self, source: &FrameSource, takes: usize) -> Option<Camera> {
+        match self {
+            Self::Reported(cameras) => cameras.get(&source.name).copied(),
+            Self::Numbered(cameras) if takes > 1 => cameras.get(&(source.take_name.clone(), source.index)).copied(),
+            Self::Numbered(cameras) => {
+                let is_it = |(place, _): &(&(String, usize), &Camera)| place.1 == source.index;
+                cameras.iter().find(is_it).map(|(_, camera)| *camera)
+            }
+        }
+    }
+}
+
+/// Frames of one camera that stands still, before a table that turns evenly. The world is laid along the axis: z points
+/// along it, the origin is the point given.
+fn turning(footage: &Footage, turn: &EvenTurn, stages: &mut Stages<'_>) -> Result<Shots, Error> {
+    let capture = Capture::read(&turn.camera)?;
+    let Some(first) = capture.frames.first().map(|frame| along_axis(&frame.camera, &turn.axis)) else {
+        return Err(Error::Failed(format!("{}: holds no camera; calibrate one", turn.camera.display())));
+    };
+    if footage.takes.len() > 1 {
+        let fault = "--step: one camera that stands still sees one film or folder, and several are given";
+        return Err(Error::Arguments(format!("{fault}; make a capture of each")));
+    }
+    let mut shots = look(footage, Some([first.intrinsics.width, first.intrinsics.height]), stages)?;
+    let start = shots.shots.first().map_or(0.0, |shot| shot.source.time_s);
+    let axis = Axis { point: Point3::origin(), direction: Vector3::z_axis() };
+    for shot in &mut shots.shots {
+        let angle = turn.step * (shot.source.time_s - start);
+        shot.set_camera(Some(turned_camera(&first, &axis, angle)));
+        (shot.angle, shot.standpoint) = (Some(angle), Some(0));
+    }
+    // Without the last digits of radians.
+    let degrees = (turn.step.to_degrees() * 1e6).round() / 1e6;
+    let centre = first.center();
+    let every = if footage.has_film() { "a second" } else { "from photograph to photograph" };
+    let assumed = format!("the table is taken to turn evenly, by {degrees}° {every}, and the camera to stand still");
+    let told_by = format!("the first camera of {}, an axis and a step", turn.camera.display());
+    let standpoints = vec![Standpoint { take: 0, azimuth: Some(centre.y.atan2(centre.x)) }];
+    Ok(Shots { standpoints, told_by, unit: capture.unit, notes: vec![assumed], ..shots })
+}
+
+/// The camera in a world whose z is the axis and whose origin is the axis's point.
+fn along_axis(camera: &Camera, axis: &Axis) -> Camera {
+    // Of opposite directions any half turn leads from one to the other.
+    let half_turn = || Rotation3::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI);
+    let turn = Rotation3::rotation_between(&Vector3::z_axis(), &axis.direction).unwrap_or_else(half_turn);
+    Camera {
+        rotation: camera.rotation * turn.matrix(),
+        translation: camera.rotation * axis.point.coords + camera.translation,
+        ..*camera
+    }
 }

@@ -92,7 +92,7 @@ fn azimuth(camera: &Camera) -> f64 {
 
 /// Refuses a ball that cannot be: it stands in the room, at one place of the picture while the camera stands still.
 pub(super) fn check_ball(shots: &Shots, options: &FootageOptions) -> Result<(), Error> {
-    if options.light_ball.is_none() || shots.standpoints().len() == 1 {
+    if options.light_ball.is_none() || shots.standpoints.len() == 1 {
         return Ok(());
     }
     let fault = "--light-ball: has to stand before a camera that stands still, and this one was carried or moved";

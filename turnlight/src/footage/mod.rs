@@ -10,18 +10,20 @@
 
 #[cfg(feature = "video")]
 mod by_board;
+mod by_colmap;
 mod cameras;
 mod light;
+mod look;
 mod pictures;
 mod report;
 mod select;
 mod shots;
 mod silhouettes;
 
-pub use cameras::CameraSource;
+pub use cameras::{CameraSource, EvenTurn};
 pub use light::FootageLight;
 pub use select::Selected;
-pub use shots::{Shot, Shots};
+pub use shots::{Shot, Shots, Standpoint};
 
 use crate::Error;
 use crate::footage_report::{self, FootageReport};
@@ -86,20 +88,18 @@ pub fn capture_footage(
     output: &Path,
     stages: &mut Stages<'_>,
 ) -> Result<CapturedFootage, Error> {
-    let shots = cameras::find_cameras(footage, options, stages)?;
+    let (shots, taken) = cameras::find_cameras(footage, options, output, stages)?;
     light::check_ball(&shots, options)?;
     let selected = select::select(&shots, options);
+    refuse_unusable(footage, &shots, &selected, stages)?;
     let sources: Vec<_> = selected.kept.iter().map(|&at| shots.shots[at].source.clone()).collect();
-    if sources.is_empty() {
-        let fault = format!("{}: no frame can be used", footage.path().display());
-        let remedy = "film sharper and slower, with the board in view all the time";
-        return Err(Error::Failed(format!("{fault} ({}); {remedy}", selected.why_none())));
-    }
     let beside = crate::output::parent(output);
-    std::fs::create_dir_all(beside).map_err(|e| Error::Failed(format!("{}: {e}; choose another", beside.display())))?;
-    let pictures = stages.run("take frames", |observer| Pictures::extract(footage, &sources, beside, observer))?;
+    let pictures = match taken.and_then(|taken| taken.only(&selected.kept)) {
+        Some(pictures) => pictures,
+        None => stages.run("take frames", |observer| Pictures::extract(footage, &sources, beside, observer))?,
+    };
     let silhouettes = stages.run("silhouettes", |_| silhouettes::find(&pictures, &shots, &selected.kept, options))?;
-    refuse_useless(footage, &selected, &silhouettes)?;
+    refuse_useless(footage, &shots, &selected, &silhouettes, stages)?;
     stages.run("even out", |_| pictures.even_out(&silhouettes.gains))?;
     let light = stages.run("light", |_| light::find(&pictures, &shots, &selected.kept, &silhouettes, options))?;
     let kept: Vec<usize> = (0..sources.len()).filter(|at| !silhouettes.contradicting.contains(at)).collect();
@@ -115,21 +115,40 @@ pub fn capture_footage(
     Ok(CapturedFootage { capture, shots, selected, silhouettes, kept, light, light_ball, pictures })
 }
 
-/// Without an object, or with a single view of it, there is nothing to write.
-fn refuse_useless(footage: &Footage, selected: &Selected, silhouettes: &Silhouettes) -> Result<(), Error> {
+/// Of footage without a usable frame there is nothing to cut out.
+fn refuse_unusable(footage: &Footage, shots: &Shots, selected: &Selected, stages: &Stages<'_>) -> Result<(), Error> {
+    if !selected.kept.is_empty() {
+        return Ok(());
+    }
+    shots.found().iter().for_each(|line| stages.observer().noted(line));
+    let fault = format!("{}: no frame can be used", footage.path().display());
+    let remedy = "film sharper and slower, with the board in view all the time";
+    Err(Error::Failed(format!("{fault} ({}); {remedy}", selected.why_none())))
+}
+
+/// Without an object, or with a single view of it, there is nothing to write; what calibration found is told all the same.
+fn refuse_useless(
+    footage: &Footage,
+    shots: &Shots,
+    selected: &Selected,
+    silhouettes: &Silhouettes,
+    stages: &Stages<'_>,
+) -> Result<(), Error> {
     let views = selected.kept.len() - silhouettes.contradicting.len();
     let fault = match (silhouettes.aabb, views) {
         (None, _) => silhouettes.findings.join("; "),
         (Some(_), 0..2) => {
             let left_out = silhouettes.contradicting.len();
             format!(
-                "{views} view can be used ({left_out} silhouettes contradict the others; {}); film all around the object, \
-                 sharp, with the board in view",
+                "{views} view can be used ({left_out} silhouettes contradict the others; {}), and a capture needs more \
+                 sides; film all around an object, sharp, with the board in view (footage of the board alone tells the lens \
+                 of other footage: --calibration)",
                 selected.why_none()
             )
         }
         _ => return Ok(()),
     };
+    shots.found().iter().for_each(|line| stages.observer().noted(line));
     Err(Error::Failed(format!("{}: {fault}", footage.path().display())))
 }
 
@@ -157,3 +176,6 @@ impl CapturedFootage {
         Ok(self.capture.write_with_report(&self.mattes(), &html, &json, output)?)
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -18,6 +18,23 @@ pub(super) struct Pictures {
     files: Vec<PathBuf>,
 }
 
+/// The pictures of frames at some positions of the footage, ascending.
+#[derive(Debug)]
+pub(super) struct Taken {
+    pub(super) positions: Vec<usize>,
+    pub(super) pictures: Pictures,
+}
+
+impl Taken {
+    /// The pictures of those of them at `kept`, ascending; `None` where one of these was not taken.
+    pub(super) fn only(mut self, kept: &[usize]) -> Option<Pictures> {
+        let at = |position: &usize| self.positions.binary_search(position).ok();
+        let files = kept.iter().map(|position| Some(self.pictures.files[at(position)?].clone()));
+        self.pictures.files = files.collect::<Option<_>>()?;
+        Some(self.pictures)
+    }
+}
+
 impl Pictures {
     /// Takes the chosen frames out of the footage, in their order there.
     pub(super) fn extract(
@@ -26,7 +43,8 @@ impl Pictures {
         beside: &Path,
         observer: &dyn Observer,
     ) -> Result<Self, Error> {
-        let folder = tempfile::Builder::new().prefix(".turnlight-").tempdir_in(beside);
+        let folder = std::fs::create_dir_all(beside)
+            .and_then(|()| tempfile::Builder::new().prefix(".turnlight-").tempdir_in(beside));
         let folder = folder.map_err(|e| Error::Failed(format!("{}: {e}; choose another folder", beside.display())))?;
         let files: Vec<PathBuf> = (0..chosen.len()).map(|i| folder.path().join(format!("{i:04}.png"))).collect();
         let mut wanted = chosen.iter().zip(&files).peekable();

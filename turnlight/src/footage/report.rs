@@ -26,7 +26,7 @@ impl CapturedFootage {
         FootageReport {
             footage: footage.path().display().to_string(),
             motion: match calibration {
-                Some(_) if self.shots.turntable().is_some() => FootageMotion::Turntable,
+                _ if !self.shots.standpoints.is_empty() => FootageMotion::Turntable,
                 Some(_) => FootageMotion::FreeHand,
                 None => FootageMotion::Unknown,
             },
@@ -44,6 +44,7 @@ impl CapturedFootage {
             silhouettes: match self.silhouettes.evidence {
                 Evidence::Plates => "told from the plates of room and table, and from each other",
                 Evidence::Backdrop => "keyed by the colour of the backdrop",
+                Evidence::Alpha => "the alpha channel of the photographs",
                 Evidence::Given => "masks given",
             }
             .to_owned(),
@@ -126,7 +127,7 @@ impl CapturedFootage {
     /// What directions are counted from: on the axis, if there is one.
     fn middle(&self) -> Point3<f64> {
         let middle = self.capture.aabb.map_or_else(Point3::origin, |aabb| aabb.center());
-        if self.shots.turntable().is_some() { Point3::new(0.0, 0.0, middle.z) } else { middle }
+        if self.shots.has_axis() { Point3::new(0.0, 0.0, middle.z) } else { middle }
     }
 
     /// Of the ring with the most frames.
@@ -164,7 +165,9 @@ impl CapturedFootage {
     }
 
     fn axis(&self) -> Option<AxisReport> {
-        let turntable = self.shots.turntable()?;
+        if !self.shots.has_axis() {
+            return None;
+        }
         let measured = self.shots.shots.iter().filter(|shot| shot.pose == PoseSource::Measured);
         let squares: Vec<f64> = measured.filter_map(|shot| shot.angle_deviation).map(|d| d * d).collect();
         let mean = squares.iter().sum::<f64>() / squares.len().max(1) as f64;
@@ -172,7 +175,7 @@ impl CapturedFootage {
             // The world is laid along it.
             point: [0.0; 3],
             direction: [0.0, 0.0, 1.0],
-            deviation_deg: turntable.axis_deviation.map(f64::to_degrees),
+            deviation_deg: self.shots.turntable().and_then(|t| t.axis_deviation).map(f64::to_degrees),
             angle_deviation_deg: (!squares.is_empty()).then(|| mean.sqrt().to_degrees()),
         })
     }

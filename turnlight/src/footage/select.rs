@@ -75,13 +75,10 @@ fn film_frame(shots: &Shots, at: usize) -> FilmFrame {
 fn viewpoint(shots: &Shots, at: usize) -> Option<Viewpoint> {
     let shot = &shots.shots[at];
     let camera = shot.camera?;
-    let standpoint = shot.standpoint.and_then(|at| shots.standpoints().get(at));
-    match (shot.angle, standpoint) {
-        (Some(angle), Some(standpoint)) => {
-            // The camera goes round the object the other way.
-            let start = standpoint.pose.inverse().translation.vector;
-            Some(Viewpoint::Angle(start.y.atan2(start.x) - angle))
-        }
+    let start = shot.standpoint.and_then(|at| shots.standpoints.get(at)?.azimuth);
+    match (shot.angle, start) {
+        // The camera goes round the object the other way.
+        (Some(angle), Some(start)) => Some(Viewpoint::Angle(start - angle)),
         _ => Some(Viewpoint::Direction(camera.center().coords)),
     }
 }

@@ -1,7 +1,7 @@
 //! Every frame of the footage, with what is known of it.
 
 use capture::Camera;
-use capture::calibrate::{Calibration, Motion, Segment, Turntable};
+use capture::calibrate::{Calibration, Motion, Turntable};
 use capture::choose::PoseSource;
 use capture::footage::FrameSource;
 use capture::silhouette::Print;
@@ -35,13 +35,44 @@ pub struct Shot {
     pub fault: Option<String>,
 }
 
+impl Shot {
+    /// A frame of which no camera is known.
+    pub(super) fn bare(source: FrameSource, sharpness: f64) -> Self {
+        Self {
+            source,
+            sharpness,
+            blur_px: None,
+            motion: 0.0,
+            camera: None,
+            pose: PoseSource::Missing,
+            angle: None,
+            angle_deviation: None,
+            standpoint: None,
+            corners: 0,
+            rms_px: 0.0,
+            fault: None,
+        }
+    }
+}
+
+/// Where the camera stood while the table turned.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Standpoint {
+    /// Position of the film or folder.
+    pub take: usize,
+    /// Its azimuth about the axis at angle 0 of the table, radians; `None` where no angles are known.
+    pub azimuth: Option<f64>,
+}
+
 /// The frames of the footage, and what is known of all of them.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Shots {
     /// In the order of the footage.
     pub shots: Vec<Shot>,
     /// Width and height in pixels.
     pub size: [usize; 2],
+    /// Where the camera stood, one place after the other; none of a camera that was carried.
+    pub standpoints: Vec<Standpoint>,
     /// What the board told, if there was one.
     pub calibration: Option<Calibration>,
     /// The board, as it was recognised or given, and where it lies.
@@ -72,8 +103,22 @@ impl Shots {
         }
     }
 
-    /// Where the camera stood while the table turned, one after the other.
-    pub fn standpoints(&self) -> &[Segment] {
-        self.turntable().map(|t| &t.segments[..]).unwrap_or_default()
+    /// What calibration found, line by line: for those who get no report.
+    pub(super) fn found(&self) -> Vec<String> {
+        let Some(calibration) = &self.calibration else { return Vec::new() };
+        let mut found = vec![self.told_by.clone(), lens_note(calibration)];
+        found.extend(self.findings.iter().chain(&self.notes).cloned());
+        found
     }
+
+    /// Whether the table turns about the world's z, by the angles of the shots.
+    pub fn has_axis(&self) -> bool {
+        self.shots.iter().any(|shot| shot.angle.is_some())
+    }
+}
+
+/// The lens, and how well the cameras fit.
+pub(super) fn lens_note(calibration: &Calibration) -> String {
+    let lens = &calibration.intrinsics;
+    format!("lens: f {:.1} px, centre ({:.1}, {:.1}), {:.2} px RMS", lens.fx, lens.cx, lens.cy, calibration.rms_px)
 }

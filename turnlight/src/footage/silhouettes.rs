@@ -1,12 +1,22 @@
-//! The object in every frame that was chosen.
+//! The object in every frame that was chosen: as masks from elsewhere or the alpha of the photographs say, else found.
 
 use super::pictures::Pictures;
 use super::{FootageOptions, Shots};
 use crate::Error;
-use capture::footage::{FrameSource, read_upright};
-use capture::silhouette::{SilhouetteOptions, Silhouettes, StageSetup, check_silhouettes, find_silhouettes};
-use capture::{Image, read_matte};
+use capture::footage::{FrameSource, read_upright, read_upright_alpha};
+use capture::silhouette::{
+    Evidence, SilhouetteOptions, Silhouettes, StageSetup, check_silhouettes, clean_plate_likeness, find_silhouettes,
+};
+use capture::{Image, has_transparency, read_matte};
+use rayon::prelude::*;
 use std::path::{Path, PathBuf};
+
+/// Frames that a clean plate is held against.
+const PLATE_WITNESSES: usize = 12;
+
+/// The share of the border that a clean plate has to show: where the camera is near, the table, which is no part of the
+/// plate, reaches out of the frame on three sides.
+const LEAST_LIKENESS: f64 = 0.2;
 
 /// Finds the silhouettes, or reads and judges those given.
 pub(super) fn find(
@@ -15,19 +25,30 @@ pub(super) fn find(
     kept: &[usize],
     options: &FootageOptions,
 ) -> Result<Silhouettes, Error> {
-    let setup = setup(shots, kept, options)?;
-    match &options.masks {
-        Some(folder) => {
-            let takes = shots.takes();
-            let mask = |&at: &usize| given(folder, &shots.shots[at].source, takes, shots.size);
-            let mattes = kept.iter().map(mask).collect::<Result<Vec<_>, _>>()?;
+    let setup = setup(pictures, shots, kept, options)?;
+    let sources: Vec<&FrameSource> = kept.iter().map(|&at| &shots.shots[at].source).collect();
+    match (&options.masks, with_alpha(&sources)) {
+        (Some(folder), _) => {
+            let mask = |source: &&FrameSource| given(folder, source, shots.takes(), shots.size);
+            let mattes = sources.iter().map(mask).collect::<Result<Vec<_>, _>>()?;
             Ok(check_silhouettes(&mattes, &setup)?)
         }
-        None => Ok(find_silhouettes(&|at| pictures.read(at), &setup, &SilhouetteOptions::default())?),
+        (None, Some(files)) => {
+            let mattes = files.iter().map(|file| read_upright_alpha(file)).collect::<Result<Vec<_>, _>>()?;
+            Ok(Silhouettes { evidence: Evidence::Alpha, ..check_silhouettes(&mattes, &setup)? })
+        }
+        (None, None) => Ok(find_silhouettes(&|at| pictures.read(at), &setup, &SilhouetteOptions::default())?),
     }
 }
 
-fn setup(shots: &Shots, kept: &[usize], options: &FootageOptions) -> Result<StageSetup, Error> {
+/// The files of the photographs, where their alpha says what the object is: not where there are films among them, nor where
+/// it is opaque everywhere. As for captures that are read, the first speaks for all.
+pub(super) fn with_alpha<'a>(sources: &[&'a FrameSource]) -> Option<Vec<&'a Path>> {
+    let files: Vec<&Path> = sources.iter().map(|source| source.file.as_deref()).collect::<Option<_>>()?;
+    files.first().is_some_and(|first| has_transparency(first)).then_some(files)
+}
+
+fn setup(pictures: &Pictures, shots: &Shots, kept: &[usize], options: &FootageOptions) -> Result<StageSetup, Error> {
     // Standpoints of which no frame was kept are none.
     let mut standpoints: Vec<usize> = kept.iter().filter_map(|&at| shots.shots[at].standpoint).collect();
     standpoints.sort_unstable();
@@ -38,7 +59,7 @@ fn setup(shots: &Shots, kept: &[usize], options: &FootageOptions) -> Result<Stag
         segments: kept.iter().map(segment).collect(),
         has_plane: shots.has_plane,
         print: shots.print,
-        clean_plates: clean_plates(shots, &standpoints, options)?,
+        clean_plates: clean_plates(pictures, shots, kept, &standpoints, options)?,
         aabb: None,
         numbers: kept.to_vec(),
     })
@@ -46,29 +67,50 @@ fn setup(shots: &Shots, kept: &[usize], options: &FootageOptions) -> Result<Stag
 
 /// Per standpoint the plate of its take: of a camera that was moved within a take only where it stood first.
 fn clean_plates(
+    pictures: &Pictures,
     shots: &Shots,
+    kept: &[usize],
     standpoints: &[usize],
     options: &FootageOptions,
 ) -> Result<Vec<Option<Image<[u8; 3]>>>, Error> {
     if options.clean_plates.is_empty() {
         return Ok(Vec::new());
     }
-    let segments = shots.standpoints();
-    if segments.is_empty() || options.clean_plates.len() > shots.takes() {
+    let places = &shots.standpoints;
+    if places.is_empty() || options.clean_plates.len() > shots.takes() {
         let fault = "--clean-plate: shows the set before a camera that stands still, one for every film or folder";
         return Err(Error::Arguments(format!("{fault}; leave it away for a camera that was carried")));
     }
     let plate = |&at: &usize| {
-        let is_first = segments.iter().position(|s| s.film == segments[at].film) == Some(at);
-        let path = options.clean_plates.get(segments[at].film).filter(|_| is_first);
-        path.map(|path| clean_plate(path, shots.size)).transpose()
+        let is_first = places.iter().position(|place| place.take == places[at].take) == Some(at);
+        let path = options.clean_plates.get(places[at].take).filter(|_| is_first);
+        let before_it = || (0..kept.len()).filter(|&i| shots.shots[kept[i]].standpoint == Some(at)).collect();
+        path.map(|path| clean_plate(path, shots.size, pictures, before_it())).transpose()
     };
     standpoints.iter().map(plate).collect()
 }
 
-fn clean_plate(path: &Path, size: [usize; 2]) -> Result<Image<[u8; 3]>, Error> {
+/// Reads a plate, and refuses one that shows another set than the pictures at positions `frames`.
+fn clean_plate(
+    path: &Path,
+    size: [usize; 2],
+    pictures: &Pictures,
+    frames: Vec<usize>,
+) -> Result<Image<[u8; 3]>, Error> {
     let plate = read_upright(path)?;
-    check_size(path, [plate.width(), plate.height()], size).map(|()| plate)
+    check_size(path, [plate.width(), plate.height()], size)?;
+    let step = frames.len().div_ceil(PLATE_WITNESSES).max(1);
+    let witnesses: Vec<_> = frames.par_iter().step_by(step).map(|&at| pictures.read(at)).collect();
+    let witnesses: Vec<Image<[u8; 3]>> = witnesses.into_iter().collect::<Result<_, _>>()?;
+    match clean_plate_likeness(&plate, &witnesses) {
+        Some(likeness) if likeness < LEAST_LIKENESS => {
+            let alike = 100.0 * likeness;
+            let fault = format!("{}: is no picture of this set: of what stays the same", path.display());
+            let remedy = "take it without the object, with the same camera, place, light and exposure, or leave --clean-plate away";
+            Err(Error::Failed(format!("{fault} at the border of the frames it shows {alike:.0} %; {remedy}")))
+        }
+        _ => Ok(plate),
+    }
 }
 
 /// The mask of a frame, of the frame's size.

@@ -22,7 +22,7 @@ impl Cluster {
 }
 
 /// Whether two colours may be the same place in other light: noise and a few percent of shade.
-fn is_near(a: &[f32; 3], b: &[f32; 3]) -> bool {
+pub(super) fn is_near(a: &[f32; 3], b: &[f32; 3]) -> bool {
     let brightest = a[0].max(a[1]).max(a[2]);
     let tolerance = 10.0 + 0.07 * brightest;
     (0..3).all(|c| (a[c] - b[c]).abs() <= tolerance)

@@ -11,6 +11,7 @@
 //!
 //! Steps 2 to 4 run three times on thumbnails, then twice at full size.
 
+mod clean_plate;
 mod cloth;
 mod cluster;
 mod consensus;
@@ -20,6 +21,7 @@ mod decision;
 mod gains;
 mod judgement;
 mod light;
+mod moving;
 mod nearby;
 mod odds;
 mod optics;
@@ -32,7 +34,9 @@ mod stage;
 #[cfg(test)]
 mod tests;
 
+pub use clean_plate::clean_plate_likeness;
 pub use judgement::check_silhouettes;
+pub use moving::find_moving;
 pub use stage::{FetchFrame, Print, StageSetup};
 
 use super::photographs::find_mattes_in_box;
@@ -60,6 +64,8 @@ pub enum Evidence {
     Plates,
     /// The colour of the backdrop alone, as in photographs.
     Backdrop,
+    /// The alpha channel of the photographs.
+    Alpha,
     /// Silhouettes from elsewhere.
     Given,
 }

@@ -525,3 +525,40 @@ fn a_loop_that_the_hull_fills_stays_open() {
         assert_eq!(mask.at(x, y) == 255, is_rope(x, y), "{x} {y}");
     }
 }
+
+/// Without any camera: the cloth stays, print and ball move.
+#[test]
+fn what_moves_before_a_still_camera_is_told_without_cameras() {
+    let stage = Stage::new(true);
+    let (images, _) = stage.shots();
+    let found = find_moving(&|i| Ok(images[i].clone()), FRAMES).unwrap().unwrap();
+    for (camera, matte) in stage.cameras().iter().zip(&found) {
+        let mut moving = [[0, 0]; 2];
+        for (x, y) in (0..SIZE.1).flat_map(|y| (0..SIZE.0).map(move |x| (x, y))) {
+            let ray = camera.ray(Point2::new(x as f64 + 0.5, y as f64 + 0.5)).unwrap();
+            let place = ray.origin - ray.direction * (ray.origin.z / ray.direction.z);
+            let is_on_board = ray.direction.z < 0.0 && place.coords.norm() < stage.board;
+            moving[usize::from(is_on_board)][usize::from(matte.at(x, y) >= 128)] += 1;
+        }
+        // A margin of two pixels around the rim is a tenth of the cloth in pictures as small as these.
+        let [[cloth, beside], [resting, turning]] = moving;
+        assert!(beside * 6 < cloth && resting * 6 < turning, "{moving:?}");
+    }
+    // The same picture for ever, or another each time.
+    assert!(find_moving(&|_| Ok(images[0].clone()), FRAMES).unwrap().is_none());
+    let carried = |i: usize| Ok(Image::filled(64, 48, [(i * 37 % 256) as u8; 3]));
+    assert!(find_moving(&carried, FRAMES).unwrap().is_none());
+    assert!(find_moving(&|i| Ok(images[i].clone()), 3).unwrap().is_none());
+}
+
+#[test]
+fn a_plate_of_another_set_is_unlike_the_border_of_the_frames() {
+    let (images, _) = Stage::new(true).shots();
+    let set = Stage { radius: 0.0, board: 0.0, ..Stage::new(true) };
+    let (plate, _) = set.shot(&set.camera(0.0), [1.0; 3]);
+    let like = |plate: &Image<[u8; 3]>| clean_plate_likeness(plate, &images).unwrap();
+    assert!(like(&plate) > 0.9, "{}", like(&plate));
+    assert_eq!(like(&plate.map(|_| [0; 3])), 0.0);
+    assert_eq!(like(&plate.map(|[r, g, b]| [b, r, g])), 0.0);
+    assert_eq!(clean_plate_likeness(&Image::filled(5, 5, [0; 3]), &images), None);
+}
