@@ -158,6 +158,16 @@ fn a_table_that_never_turned_is_told() {
 }
 
 #[test]
+fn a_film_from_one_side_tells_what_calibration_found_all_the_same() {
+    let held = |k: usize| Cartoon { elevation_deg: 29.0 + 0.3 * k as f64, ..Cartoon::default() };
+    let frames: Vec<_> = (0..8).map(|k| held(k).frame(0.005 * k as f64).image).collect();
+    let (_folder, path) = film_of(&frames);
+    let said = complaint(&path, &["--motion", "free-hand"]);
+    assert!(said.contains("in 8 of 8 frames") && said.contains("px RMS") && said.contains("one tilt"), "{said}");
+    assert!(said.contains("1 view can be used") && said.contains("--calibration"), "{said}");
+}
+
+#[test]
 fn a_film_cut_short_is_used_as_far_as_it_goes_or_refused() {
     let cartoon = Cartoon::default();
     let frames = images(&draw(&cartoon, &angles(24, 0.9)));

@@ -103,8 +103,8 @@ fn calibrated(footage: &Footage, path: &Path, stages: &mut Stages<'_>) -> Result
     if shots.shots.iter().all(|shot| shot.camera.is_none()) {
         let (film, cameras) = (footage.path().display(), path.display());
         let fault = format!("{film}: {cameras} has a camera for none of its {} frames", shots.shots.len());
-        let remedy = "name the pictures there by the numbers of the frames, counted from 0 (0012.png), give a capture made of \
-                      this film, or one camera and how the table turns (--step)";
+        let remedy = "name the pictures there by the numbers of the frames, counted from 0 (0012.png), give a capture \
+                      made of this film, or one camera and how the table turns (--step)";
         return Err(Error::Failed(format!("{fault}; {remedy}")));
     }
     Ok(Shots { told_by: format!("cameras of {}", path.display()), unit: capture.unit, ..shots })

@@ -106,8 +106,9 @@ fn clean_plate(
         Some(likeness) if likeness < LEAST_LIKENESS => {
             let alike = 100.0 * likeness;
             let fault = format!("{}: is no picture of this set: of what stays the same", path.display());
-            let remedy = "take it without the object, with the same camera, place, light and exposure, or leave --clean-plate away";
-            Err(Error::Failed(format!("{fault} at the border of the frames it shows {alike:.0} %; {remedy}")))
+            let shown = format!("at the border of the frames it shows {alike:.0} %");
+            let remedy = "take it with the camera as it stood, in the same light, or leave --clean-plate away";
+            Err(Error::Failed(format!("{fault} {shown}; {remedy}")))
         }
         _ => Ok(plate),
     }
