@@ -258,6 +258,28 @@ fn leaving_components_out_costs_less_than_a_thousandth_of_the_likelihood() {
     assert!(evaluations < 36.0, "{evaluations} of 40 were evaluated");
 }
 
+/// Warm-up, components left out and put elsewhere: all of them, beside as many rounds of plain EM from the same start.
+#[test]
+fn the_fit_as_it_is_reaches_the_likelihood_of_plain_em() {
+    let lights: Vec<Vector3<f64>> = rings(12);
+    let btf = tile([8, 8], [lights.clone(), lights], stripes);
+    let (grid, pairs) = (Grid::of(&btf), all_pairs(&btf));
+    let samples = all_samples(&grid, &pairs);
+    let options = Options::new(&btf, Budget::Components(10), Precision::Full, 3).unwrap();
+    let found = estimate(&grid, &pairs, 10, &options);
+    assert!(800 * 10 < samples.len(), "there is a warm-up");
+    let mut plain = start(&grid, &pairs, 10, &found.shape, &FLOORS, options.seed);
+    let before = plain_round(&samples, grid.periods, &plain, &FLOORS).0;
+    for _ in 0..options.rounds {
+        plain = plain_round(&samples, grid.periods, &plain, &FLOORS).1;
+    }
+    let [ours, theirs] = [&found.components, &plain].map(|c| plain_round(&samples, grid.periods, c, &FLOORS).0);
+    // Units shift a likelihood: what counts is how far it has risen.
+    let risen = theirs - before;
+    println!("{} samples: rose by {risen}, plain; by {} less", samples.len(), theirs - ours);
+    assert!(risen > 0.1 && theirs - ours < 1e-3 * risen, "{ours} {theirs} after {before}");
+}
+
 /// Twenty rounds beside plain EM, on 16 × 16 texels under 27 × 27 directions.
 #[test]
 #[ignore = "half a minute: plain EM goes over 187 thousand samples and 60 components in every round"]
