@@ -249,13 +249,12 @@ impl DirectionComplex {
     pub(crate) fn candidates(&self, centre: &Vector3<f64>, radius: f64) -> Candidates {
         let meets =
             |inverse: &Matrix3<f64>| inverse.row_iter().all(|row| (row * centre).x >= -row.norm() * radius - 1e-9);
-        let of_site = |s: &Vector3<f64>| angle(s, centre);
+        let sites: Vec<f64> = self.sites.iter().map(|s| angle(s, centre)).collect();
         let of_edge = |&[i, j]: &[u32; 2]| {
-            let (a, b) = (self.sites[i as usize], self.sites[j as usize]);
-            let foot = project_to_arc(centre, &a, &b).map_or(PI, |(cosine, _)| cosine.clamp(-1.0, 1.0).acos());
-            foot.min(of_site(&a)).min(of_site(&b))
+            let [i, j] = [i as usize, j as usize];
+            let foot = project_to_arc(centre, &self.sites[i], &self.sites[j]);
+            foot.map_or(PI, |(cosine, _)| cosine.clamp(-1.0, 1.0).acos()).min(sites[i]).min(sites[j])
         };
-        let sites: Vec<f64> = self.sites.iter().map(of_site).collect();
         let edges: Vec<f64> = self.edges.iter().map(of_edge).collect();
         let reach = sites.iter().chain(&edges).copied().fold(PI, f64::min) + 2.0 * radius;
         Candidates {

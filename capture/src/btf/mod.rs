@@ -26,6 +26,7 @@ use crate::CaptureError;
 use nalgebra::Vector3;
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
 
 /// How a sample stands for radiance `L · exposure`.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -101,13 +102,28 @@ fn lists_of_lights(folder: &Path) -> Result<Vec<PathBuf>, CaptureError> {
     Ok(lists)
 }
 
+/// Steps of the table of linear light, as many as make a straight line between two off by no more than an `f32` rounds.
+const STEPS: usize = 4096;
+
+/// Linear light of an encoded value: between black and white by a table, for powers take most of the time of a picture.
+fn linear(encoded: f32) -> f32 {
+    static TABLE: LazyLock<Vec<f32>> =
+        LazyLock::new(|| (0..=STEPS).map(|k| crate::srgb::linear(k as f64 / STEPS as f64) as f32).collect());
+    let place = encoded * STEPS as f32;
+    let k = place as usize;
+    // The straight part ends within a step.
+    if encoded <= 0.040_45 || k >= STEPS {
+        return crate::srgb::linear(f64::from(encoded)) as f32;
+    }
+    TABLE[k] + (place - k as f32) * (TABLE[k + 1] - TABLE[k])
+}
+
 impl Encoding {
     /// Radiance times exposure of a sample. Negative samples, which codecs may answer with, are 0.
     pub fn decode(self, sample: f32) -> f32 {
         let sample = sample.max(0.0);
         match self {
-            Self::Srgb if sample <= 0.040_45 => sample / 12.92,
-            Self::Srgb => ((sample + 0.055) / 1.055).powf(2.4),
+            Self::Srgb => linear(sample),
             Self::Linear => sample,
             Self::Log { floor, peak } => floor * (sample * (peak / floor).ln_1p()).exp_m1(),
         }

@@ -31,6 +31,15 @@ fn encodings_return_what_they_took() {
 }
 
 #[test]
+fn the_table_of_light_is_the_formula() {
+    for k in 0..=200_000 {
+        let sample = k as f32 / 160_000.0;
+        let (found, exact) = (Encoding::Srgb.decode(sample), crate::srgb::linear(f64::from(sample)));
+        assert!((f64::from(found) - exact).abs() <= 6e-8 + 1e-7 * exact, "{sample}: {found} {exact}");
+    }
+}
+
+#[test]
 fn what_is_no_number_is_taken_from_the_nearest_light() {
     let mut btf = ramp(4);
     btf.samples[12 * 2 + 5] = f32::NAN;

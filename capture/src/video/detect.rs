@@ -54,9 +54,8 @@ pub fn detect_markers(image: &Image<[u8; 3]>, dictionary: Dictionary) -> Result<
 /// [`CaptureError::OpenCv`] where OpenCV fails.
 pub fn guess_dictionary(images: &[Image<[u8; 3]>]) -> Result<Option<Dictionary>, CaptureError> {
     let greys: Vec<Image<u8>> = images.iter().map(grey).collect();
-    let families = Dictionary::all().chunk_by(|a, b| a.modules() == b.modules() && a.len() < b.len());
     let mut best = (0, None);
-    for family in families {
+    for family in families() {
         let Some(&largest) = family.last() else { continue };
         let mut ids = Vec::new();
         for grey in &greys {
@@ -64,12 +63,23 @@ pub fn guess_dictionary(images: &[Image<[u8; 3]>]) -> Result<Option<Dictionary>,
             ids.extend(found.iter().map(|marker| marker.id));
         }
         let highest = often_seen(&ids).into_iter().max();
-        let enough = family.iter().find(|d| highest.is_some_and(|id| id < d.len())).copied();
+        let enough = highest.map(|id| smallest_with(largest, id));
         if ids.len() > best.0 {
             best = (ids.len(), enough);
         }
     }
     Ok(best.1)
+}
+
+/// Dictionaries that share their markers, the smallest first.
+fn families() -> impl Iterator<Item = &'static [Dictionary]> {
+    Dictionary::all().chunk_by(|a, b| a.modules() == b.modules() && a.len() < b.len())
+}
+
+/// The smallest dictionary of the same family that has a marker; the same where none has.
+pub(super) fn smallest_with(dictionary: Dictionary, id: usize) -> Dictionary {
+    let family = families().find(|family| family.contains(&dictionary)).unwrap_or_default();
+    family.iter().find(|d| id < d.len()).copied().unwrap_or(dictionary)
 }
 
 /// The ids that occur at least a fifth as often as the most frequent one.

@@ -1,11 +1,14 @@
 //! Finds out what kind of board is in the pictures, by trying.
 
-use super::detect::{apply, chessboard_counts, grey, guess_dictionary, homography, level, markers_in, often_seen};
+use super::detect::{
+    apply, chessboard_counts, grey, guess_dictionary, homography, level, markers_in, often_seen, smallest_with,
+};
 use super::{BoardView, FoundMarker, detect_board, detect_markers};
 use crate::board::{Board, Dictionary};
 use crate::{CaptureError, Image, srgb};
 use nalgebra::{Matrix3, Point2, Vector2};
 use opencv::aruco::CornerRefineMethod;
+use opencv::calib3d;
 use rayon::prelude::*;
 
 /// What there is to find in every frame.
@@ -25,6 +28,8 @@ const FIT: f64 = 0.12;
 const FORTIETHS: std::ops::RangeInclusive<i32> = 20..=38;
 /// Places of a square that are looked at.
 const PLACES: usize = 256;
+/// All pairs count, as a method of [`homography`].
+const LEAST_SQUARES: i32 = 0;
 /// (√5 − 1) / 2: its multiples are as far from whole numbers as can be.
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
@@ -53,7 +58,10 @@ pub fn recognise_pattern(images: &[Image<[u8; 3]>]) -> Result<Option<Pattern>, C
     let board = candidates(dictionary, highest).par_bridge().filter_map(|board| Some((misfit(&board, &seen)?, board)));
     // Ties go to the board of fewer columns, whatever thread found it.
     let best = board.min_by(|(a, x), (b, y)| a.total_cmp(b).then(x.counts().cmp(&y.counts())));
-    let found = best.filter(|(misfit, _)| *misfit < FIT).and_then(|(_, board)| measured(&board, &images, &seen));
+    let found = best.filter(|(misfit, _)| *misfit < FIT).and_then(|(_, board)| {
+        let board = without_strays(&board, &mut seen)?;
+        measured(&board, &images, &seen)
+    });
     Ok(Some(found.map_or(Pattern::Markers(dictionary), Pattern::Board)))
 }
 
@@ -104,7 +112,7 @@ fn candidates(dictionary: Dictionary, highest: usize) -> impl Iterator<Item = Bo
 /// pictures. Middles do not depend on how large the markers are in their squares. `None` where no picture tells.
 fn misfit(board: &Board, seen: &[Vec<FoundMarker>]) -> Option<f64> {
     let in_picture = |markers: &Vec<FoundMarker>| {
-        let (map, pairs) = middles_map(board, markers)?;
+        let (map, pairs) = middles_map(board, markers, LEAST_SQUARES, 0.0)?;
         let sides: f64 =
             markers.iter().map(|m| (m.corners[0] - m.corners[1]).norm()).sum::<f64>() / markers.len() as f64;
         let square: f64 = pairs
@@ -118,10 +126,37 @@ fn misfit(board: &Board, seen: &[Vec<FoundMarker>]) -> Option<f64> {
     misfits.get(misfits.len() / 2).copied()
 }
 
+/// Leaves out markers that are not where the board has them: glitter is misread as one now and then, and of a high id
+/// it would make the board a long one. The board then ends with the row of the highest id left, its dictionary is the
+/// smallest that has it.
+fn without_strays(board: &Board, seen: &mut [Vec<FoundMarker>]) -> Option<Board> {
+    let known = board.markers();
+    for markers in seen.iter_mut() {
+        let side = markers.iter().map(|m| (m.corners[0] - m.corners[1]).norm()).fold(f64::INFINITY, f64::min);
+        let Some((map, _)) = middles_map(board, markers, calib3d::RANSAC, FIT * side) else { continue };
+        let off = |m: &FoundMarker| {
+            let corners = known.get(m.id)?.corners;
+            let expected = apply(&map, &nalgebra::center(&corners[0], &corners[2]).xy())?;
+            Some((middle_of(&m.corners)? - expected).norm() / (m.corners[0] - m.corners[1]).norm())
+        };
+        // Beyond a marker's side no lens bends it.
+        markers.retain(|m| off(m).is_some_and(|off| off < 1.0));
+    }
+    let highest = seen.iter().flatten().map(|m| m.id).max()?;
+    let dictionary = smallest_with(board.dictionary()?, highest);
+    let is_alike = |other: &Board| match (board, other) {
+        (Board::Charuco { light_first: a, .. }, Board::Charuco { light_first: b, .. }) => a == b,
+        (Board::ArucoGrid { .. }, Board::ArucoGrid { .. }) => true,
+        _ => false,
+    };
+    candidates(dictionary, highest).find(|other| is_alike(other) && other.counts()[0] == board.counts()[0])
+}
+
 type Pairs = Vec<(Point2<f64>, Point2<f64>)>;
 
-/// The homography from the board to a picture by the middles of markers alone, robustly, and the pairs.
-fn middles_map(board: &Board, markers: &[FoundMarker]) -> Option<(Matrix3<f64>, Pairs)> {
+/// The homography from the board to a picture by the middles of markers alone, and the pairs; `method` and `tolerance`
+/// as of [`homography`].
+fn middles_map(board: &Board, markers: &[FoundMarker], method: i32, tolerance: f64) -> Option<(Matrix3<f64>, Pairs)> {
     let known = board.markers();
     let middle = |m: &FoundMarker| {
         let place = known.get(m.id)?;
@@ -135,7 +170,7 @@ fn middles_map(board: &Board, markers: &[FoundMarker]) -> Option<(Matrix3<f64>, 
     if pairs.len() < FEWEST || !spans(0) || !spans(1) {
         return None;
     }
-    let map = homography(&pairs, 0, 0.0).ok().flatten()?;
+    let map = homography(&pairs, method, tolerance).ok().flatten()?;
     Some((map, pairs))
 }
 
@@ -151,7 +186,9 @@ fn measured(board: &Board, images: &[Image<u8>], seen: &[Vec<FoundMarker>]) -> O
     let mut sides = Vec::new();
     let mut upright = 0_usize;
     for markers in seen {
-        let Some(back) = middles_map(board, markers).and_then(|(map, _)| map.try_inverse()) else { continue };
+        let Some(back) = middles_map(board, markers, LEAST_SQUARES, 0.0).and_then(|(map, _)| map.try_inverse()) else {
+            continue;
+        };
         for marker in markers {
             let Some([a, b, _, d]) = all(marker.corners.map(|corner| apply(&back, &corner))) else { continue };
             sides.push(0.5 * ((b - a).norm() + (d - a).norm()));
@@ -192,7 +229,7 @@ type Looked = Vec<(Point2<f64>, f64)>;
 
 /// The square of every marker that is seen: what is in it but for the size of the marker.
 fn around(board: &Board, image: &Image<u8>, markers: &[FoundMarker]) -> Vec<Looked> {
-    let Some((map, _)) = middles_map(board, markers) else { return Vec::new() };
+    let Some((map, _)) = middles_map(board, markers, LEAST_SQUARES, 0.0) else { return Vec::new() };
     let known = board.markers();
     let of_marker = |marker: &FoundMarker| {
         let corners = known.get(marker.id)?.corners;

@@ -406,8 +406,10 @@ fn read_header(from: &mut Reader<'_>) -> Result<(impl FnOnce(Codec) -> Material 
     let texel_pitch_mm = Some(from.f32()?).filter(|pitch| *pitch > 0.0);
     let raw_bytes = from.u64()?;
     let (width, height) = (usize::from(from.u16()?), usize::from(from.u16()?));
-    let views = Arc::new(read_directions(from)?);
-    let lights = Arc::new(read_directions(from)?);
+    let [views, lights] = [read_directions(from)?, read_directions(from)?];
+    let is_shared = views == lights;
+    let views = Arc::new(DirectionSet::new(&views));
+    let lights = if is_shared { views.clone() } else { Arc::new(DirectionSet::new(&lights)) };
     if let Some(fault) = unstorable(width, height, views.len(), lights.len()) {
         return Err(Fault(fault));
     }
@@ -422,10 +424,10 @@ fn log_encoding(floor: f32, peak: f32) -> Result<Encoding, Fault> {
     Err(Fault(format!("its logarithm runs from {floor} to {peak}")))
 }
 
-fn read_directions(from: &mut Reader<'_>) -> Result<DirectionSet, Fault> {
+fn read_directions(from: &mut Reader<'_>) -> Result<Vec<Vector3<f64>>, Fault> {
     let count = usize::from(from.u16()?);
     if count == 0 {
-        return Ok(DirectionSet::new(&bonn_directions()));
+        return Ok(bonn_directions());
     }
     let flat = from.f32s(2 * count)?;
     let direction = |xy: &[f32]| {
@@ -434,7 +436,7 @@ fn read_directions(from: &mut Reader<'_>) -> Result<DirectionSet, Fault> {
         let unit = Vector3::new(x, y, rest.max(0.0).sqrt()).try_normalize(0.5);
         unit.filter(|_| rest > -1e-6).ok_or_else(|| Fault(format!("({x}, {y}) is no direction")))
     };
-    Ok(DirectionSet::new(&flat.chunks_exact(2).map(direction).collect::<Result<Vec<_>, _>>()?))
+    flat.chunks_exact(2).map(direction).collect()
 }
 
 fn checksum(bytes: &[u8]) -> u32 {

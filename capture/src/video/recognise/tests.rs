@@ -65,10 +65,10 @@ fn small_markers_are_found_as_large_as_they_are() {
     }
 }
 
-/// Puts marker 3 of a dictionary into the upper left corner of a picture, 48 pixels wide.
-fn put_marker(image: &mut Image<[u8; 3]>, dictionary: Dictionary) {
-    let board = Board::ArucoGrid { columns: 4, rows: 1, marker: 1.0, gap: 0.5, dictionary };
-    let top_left = board.markers()[3].corners[0];
+/// Puts a marker into the upper left corner of a picture, 48 pixels wide.
+fn put_marker(image: &mut Image<[u8; 3]>, dictionary: Dictionary, id: usize) {
+    let board = Board::ArucoGrid { columns: id + 1, rows: 1, marker: 1.0, gap: 0.5, dictionary };
+    let top_left = board.markers()[id].corners[0];
     for (x, y) in (0..48).flat_map(|y| (0..48).map(move |x| (x, y))) {
         let place = Point2::new(top_left.x + (x as f64 + 0.5) / 48.0, top_left.y - (y as f64 + 0.5) / 48.0);
         image.set(16 + x, 16 + y, if board.is_dark(place) { [35; 3] } else { [205; 3] });
@@ -80,13 +80,25 @@ fn one_marker_beside_a_chessboard_does_not_hide_it() {
     let board: Board = "chessboard:10x7:25mm".parse().unwrap();
     let dictionary = "4x4_50".parse().unwrap();
     let mut images = pictures(&board);
-    put_marker(&mut images[1], dictionary);
+    put_marker(&mut images[1], dictionary, 3);
     assert_eq!(guess_dictionary(&images).unwrap(), Some(dictionary));
     assert_eq!(recognise_pattern(&images).unwrap(), Some(Pattern::Board(in_squares(&board))));
     // Alone it is what there is.
     let mut alone = Image::filled(640, 480, [205; 3]);
-    put_marker(&mut alone, dictionary);
+    put_marker(&mut alone, dictionary, 3);
     assert_eq!(recognise_pattern(&[alone]).unwrap(), Some(Pattern::Markers(dictionary)));
+}
+
+/// Glitter on chrome, say.
+#[test]
+fn a_stray_marker_of_a_high_id_makes_no_board_longer() {
+    for text in ["charuco:7x7:20mm:15mm:4x4_50", "aruco:5x4:30mm:8mm:4x4_50"] {
+        let board: Board = text.parse().unwrap();
+        let mut images = pictures(&board);
+        put_marker(&mut images[1], "4x4_250".parse().unwrap(), 160);
+        let Some(Pattern::Board(found)) = recognise_pattern(&images).unwrap() else { panic!("{text}") };
+        assert_eq!((found.counts(), found.dictionary()), (board.counts(), board.dictionary()));
+    }
 }
 
 #[test]

@@ -67,12 +67,13 @@ pub(super) trait Vector: Copy {
     fn sum(self) -> f32 {
         let mut row = [0.0; LANES];
         self.store(&mut row);
-        for half in [8, 4, 2, 1] {
-            for k in 0..half {
-                row[k] += row[k + half];
-            }
+        for k in 0..8 {
+            row[k] += row[k + 8];
         }
-        row[0]
+        for k in 0..4 {
+            row[k] += row[k + 4];
+        }
+        (row[0] + row[2]) + (row[1] + row[3])
     }
 
     /// The largest lane.
@@ -80,12 +81,13 @@ pub(super) trait Vector: Copy {
     fn largest(self) -> f32 {
         let mut row = [0.0; LANES];
         self.store(&mut row);
-        for half in [8, 4, 2, 1] {
-            for k in 0..half {
-                row[k] = row[k].max(row[k + half]);
-            }
+        for k in 0..8 {
+            row[k] = row[k].max(row[k + 8]);
         }
-        row[0]
+        for k in 0..4 {
+            row[k] = row[k].max(row[k + 4]);
+        }
+        row[0].max(row[2]).max(row[1].max(row[3]))
     }
 }
 

@@ -20,7 +20,8 @@
 //!
 //! **Cost**: samples × M × the share that is not left out (half of 300, less of more) × rounds, the first third of
 //! which take 4 % of the samples; in memory M × (lights + views) sums for each of 32 parts and M² for the refit.
-//! An answer: M densities of six variables, sixteen at a time; those of light and eye once for texels asked for together.
+//! An answer: M densities of light and eye, once for texels asked for together, then two products and four sums a
+//! component, sixteen at a time ([`prediction`]).
 //!
 //! **Tiles** that continue themselves are coded so: along an axis where texels differ at most 1.1 times as much across
 //! the border as where they differ most within, the difference of a place from a mean is that to the nearest of the
@@ -57,7 +58,7 @@ use capture::btf::Btf;
 use estimation::{Estimate, estimate};
 use mixture::{Component, Packed};
 use nalgebra::Vector3;
-use prediction::Exponents;
+use prediction::Places;
 use variables::{FLOORS, Grid, Period, onion_slice};
 
 /// Samples beyond this were not encoded.
@@ -103,7 +104,7 @@ pub struct GaussianMixture {
     components: Vec<Component>,
     /// The components, ready to be evaluated.
     packed: Box<Packed>,
-    exponents: Exponents,
+    places: Places,
 }
 
 impl Options {
@@ -204,18 +205,16 @@ fn describe(found: &Estimate, asked: usize, options: &Options, notes: &mut Vec<S
 }
 
 impl GaussianMixture {
-    /// Components are put into the order of their places: of sixteen side by side, all or none then matter to a texel.
     fn new(
         frame: Frame,
         precision: Precision,
         periods: [Period; 2],
         mean: Vec<u8>,
-        mut components: Vec<Component>,
+        components: Vec<Component>,
     ) -> Self {
-        components.sort_by_key(|c| place_on_curve(c, &frame));
         let packed = Box::new(Packed::new(&components, periods));
-        let exponents = Exponents::of([frame.width, frame.height]);
-        Self { frame, precision, mean, components, packed, exponents }
+        let places = Places::of([frame.width, frame.height].map(variables::centres));
+        Self { frame, precision, mean, components, packed, places }
     }
 
     /// M.
@@ -236,13 +235,6 @@ impl GaussianMixture {
         }
         colour
     }
-}
-
-/// Along a curve through 256 × 256 cells that stays in each quarter, and each quarter of it, as long as it can (Morton).
-fn place_on_curve(component: &Component, frame: &Frame) -> u32 {
-    let cell = |mean: f64, side: usize| (256.0 * mean / side as f64).clamp(0.0, 255.0) as u32;
-    let (x, y) = (cell(component.mean[0], frame.width), cell(component.mean[1], frame.height));
-    (0..8).map(|bit| (x >> bit & 1) << (2 * bit) | (y >> bit & 1) << (2 * bit + 1)).sum()
 }
 
 /// α and s of light, then eye; the normal's where a vector is none.
@@ -269,7 +261,7 @@ impl Sampler for GaussianMixture {
     fn values(&self, texels: &[usize], light: &Vector3<f32>, view: &Vector3<f32>, out: &mut [[f32; 3]]) {
         let (angles, mean) = (angles(light, view), self.mean_colour(light, view));
         let width = self.frame.width;
-        let place = |texel: usize| self.exponents.at(&self.packed, [texel % width, texel / width]);
+        let place = |texel: usize| self.places.at(&self.packed, [texel % width, texel / width]);
         for (texels, out) in texels.chunks(prediction::FEW).zip(out.chunks_mut(prediction::FEW)) {
             let found = match *texels {
                 [texel] => [prediction::one(&self.packed, angles, &[place(texel)])[0]; prediction::FEW],
@@ -285,9 +277,8 @@ impl Sampler for GaussianMixture {
     }
 
     fn picture(&self, light: &Vector3<f32>, view: &Vector3<f32>) -> Vec<f32> {
-        let [x, y] = [self.frame.width, self.frame.height].map(variables::centres);
         let mean = self.mean_colour(light, view);
-        let mut picture = prediction::picture(&self.packed, &x, &y, angles(light, view));
+        let mut picture = prediction::picture(&self.packed, &self.places, angles(light, view));
         picture.chunks_exact_mut(3).for_each(|texel| (0..3).for_each(|c| texel[c] += mean[c]));
         picture
     }

@@ -1,112 +1,100 @@
 //! The expected colour where place, light and eye are given: `Σ_m W_m μ_m`, W the components' shares of the inputs.
 //!
-//! Logarithms are shifted by their maximum, so far from all components the nearest answers and nothing is
-//! ever 0/0. A whole picture leaves components out tile by tile; single samples go over all components, which takes
-//! less time than to find out which matter.
+//! Components are products, so a share is one too: `W_m ∝ L_m · X_m · Y_m`, L of light and eye, with the weight, X of
+//! the column and Y of the row. X and Y are kept for a tile; L, an exponential a component, is found once for texels
+//! asked for together and once for a whole picture. What is left is two products and four sums a component and texel.
+//!
+//! L goes from 1 down to e⁻⁶⁰, X and Y to e⁻⁴⁰, and 0 stands below; both are raised by e³⁰, so that no product is a
+//! denormal number. Where the sum is more than e⁻²² without that, what was left out is less than `M · e⁻¹⁸` of it.
+//! Elsewhere, far from all components that light and eye make likely, logarithms are shifted by the largest: the
+//! nearest answer and nothing is ever 0/0.
 
 use super::lanes::{LANES, Row, Vector, kernel};
-use super::mixture::{Likely, Packed, Tile};
+use super::mixture::Packed;
 use super::variables::{Grid, INPUTS};
 use rayon::prelude::*;
 use std::sync::OnceLock;
 
-/// Components further below the best than this change an answer by less than the rounding of `f32`.
-pub(super) const REACH: f32 = 18.0;
+/// Logarithm of what shares of a column, and of a row, are raised by.
+const RAISED: f32 = 30.0;
 
-/// Vectors of components whose logarithms are kept at a time: 640 components.
-const BLOCK: usize = 40;
+/// Exponents from which on the share of a column, or of a row, is 0.
+const FAR: f32 = 40.0;
+
+/// Sum of raised shares below which too much may have been left out: `exp(2 RAISED − FAR + 18)`.
+const ENOUGH: f32 = 3.185_593e16;
+
+/// Vectors of components of which shares are kept on the stack: 640 components.
+const ON_STACK: usize = 40;
 
 /// Places asked for at once: those of bilinear interpolation; a wider footprint has up to sixteen.
 pub(super) const FEW: usize = 4;
 
-/// Colours less the mean over a grid of texels, (y, x, channel), α and s of light and view given.
-pub(super) fn picture(mixture: &Packed, x: &[f32], y: &[f32], angles: [f32; 4]) -> Vec<f32> {
-    let mut out = vec![0.0; 3 * x.len() * y.len()];
-    run_picture(mixture, &mut Tile::all(x, y), angles, x.len(), &mut out);
-    out
-}
+/// Shares of x and of y at a place.
+pub(super) type Place<'a> = [&'a Along; 2];
 
-kernel! {
-    /// Fills `out`, `width` texels wide.
-    fn run_picture(mixture: &Packed, tiles: &mut [Tile], angles: [f32; 4], width: usize, out: &mut [f32]) = picture_with
-}
-
-#[inline(always)]
-fn picture_with<V: Vector>(mixture: &Packed, tiles: &mut [Tile], angles: [f32; 4], width: usize, out: &mut [f32]) {
-    let (mut likely, mut energy) = (Likely::default(), Vec::new());
-    mixture.energies::<V>(&mixture.input, 2, &angles, &mut energy);
-    for tile in tiles {
-        likely.find::<V>(mixture, &energy, tile, false, REACH);
-        for row in 0..tile.rows {
-            let colours = mixed::<V>(mixture, &likely, row);
-            let at = 3 * ((tile.corner[1] + row) * width + tile.corner[0]);
-            for (k, texel) in out[at..at + 3 * tile.columns].chunks_exact_mut(3).enumerate() {
-                for c in 0..3 {
-                    texel[c] = colours[c][k];
-                }
-            }
-        }
-    }
-}
-
-/// The colours of one row of a tile.
-#[inline(always)]
-fn mixed<V: Vector>(mixture: &Packed, likely: &Likely, row: usize) -> [Row; 3] {
-    let mut sums = [V::splat(0.0); 3];
-    for (&component, share) in likely.list.iter().zip(&likely.shares) {
-        let share = V::load(&share[row]);
-        for c in 0..3 {
-            sums[c] = share.times_plus(V::splat(mixture.mean[INPUTS + c][component as usize]), sums[c]);
-        }
-    }
-    let mut colours = [[0.0; LANES]; 3];
-    for c in 0..3 {
-        sums[c].store(&mut colours[c]);
-        for k in 0..LANES {
-            colours[c][k] /= likely.total[row][k];
-        }
-    }
-    colours
-}
-
-/// Exponents of x and of y at a place, per component.
-pub(super) type Place<'a> = [&'a [Row]; 2];
-
-/// Exponents of an axis, `((place − mean) · scale)²`, per component.
-pub(super) fn exponents(mixture: &Packed, axis: usize, place: f32) -> Vec<Row> {
-    let [means, scales] = [&mixture.mean, &mixture.scale].map(|all| all[axis].as_chunks::<LANES>().0);
-    let exponent = |mean: f32, scale: f32| (mixture.periods[axis].nearest_of(place - mean) * scale).powi(2);
-    let row = |(mean, scale): (&Row, &Row)| std::array::from_fn(|k| exponent(mean[k], scale[k]));
-    means.iter().zip(scales).map(row).collect()
-}
-
-/// Exponents of each column and row of a tile, found when they are first asked for: at most 4 bytes for each component
-/// and each of them.
+/// Components' shares at a place along an axis.
 #[derive(Clone, Debug)]
-pub(super) struct Exponents {
-    along: [Vec<OnceLock<Vec<Row>>>; 2],
+pub(super) struct Along {
+    place: f32,
+    /// `exp(RAISED − ((place − mean) · scale)²)`, or 0.
+    shares: Vec<Row>,
 }
 
-impl Exponents {
-    /// Of a tile of `size` (columns, rows) texels.
-    pub(super) fn of(size: [usize; 2]) -> Self {
-        Self { along: size.map(|side| vec![OnceLock::new(); side]) }
+impl Along {
+    pub(super) fn at(mixture: &Packed, axis: usize, place: f32) -> Self {
+        let [means, scales] = [&mixture.mean, &mixture.scale].map(|all| all[axis].as_chunks::<LANES>().0);
+        let share = |mean: f32, scale: f32| {
+            let exponent = (mixture.periods[axis].nearest_of(place - mean) * scale).powi(2);
+            if exponent < FAR { (RAISED - exponent).exp() } else { 0.0 }
+        };
+        let row = |(mean, scale): (&Row, &Row)| std::array::from_fn(|k| share(mean[k], scale[k]));
+        Self { place, shares: means.iter().zip(scales).map(row).collect() }
+    }
+}
+
+/// Columns and rows, their shares found when they are first asked for: at most 4 bytes for each component and each of them.
+#[derive(Clone, Debug)]
+pub(super) struct Places {
+    /// x and y, texels.
+    centres: [Vec<f32>; 2],
+    along: [Vec<OnceLock<Along>>; 2],
+}
+
+impl Places {
+    /// Of columns and rows with these middles.
+    pub(super) fn of(centres: [Vec<f32>; 2]) -> Self {
+        let along = centres.each_ref().map(|axis| vec![OnceLock::new(); axis.len()]);
+        Self { centres, along }
     }
 
     /// Of the middle of the texel in a column and row.
     pub(super) fn at(&self, mixture: &Packed, texel: [usize; 2]) -> Place<'_> {
         [0, 1].map(|axis| {
-            let found = &self.along[axis][texel[axis]];
-            found.get_or_init(|| exponents(mixture, axis, texel[axis] as f32 + 0.5)).as_slice()
+            let k = texel[axis];
+            self.along[axis][k].get_or_init(|| Along::at(mixture, axis, self.centres[axis][k]))
         })
     }
 }
 
 /// What follows from components and size makes no codec another one.
-impl PartialEq for Exponents {
+impl PartialEq for Places {
     fn eq(&self, _: &Self) -> bool {
         true
     }
+}
+
+/// Colours less the mean of all places, (y, x, channel), α and s of light and view given.
+pub(super) fn picture(mixture: &Packed, places: &Places, angles: [f32; 4]) -> Vec<f32> {
+    let [width, height] = places.centres.each_ref().map(Vec::len);
+    let mut out = vec![[0.0; 3]; width * height];
+    run_picture(mixture, angles, places, &mut out);
+    out.into_flattened()
+}
+
+kernel! {
+    /// Fills `out`.
+    fn run_picture(mixture: &Packed, angles: [f32; 4], places: &Places, out: &mut [[f32; 3]]) = picture_with
 }
 
 kernel! {
@@ -115,8 +103,27 @@ kernel! {
 }
 
 kernel! {
-    /// The same of some places: a vector of components is loaded once for all, and left out where it matters to none.
+    /// The same of some places, as they answer alone.
     fn few(mixture: &Packed, angles: [f32; 4], places: &[Place<'_>; FEW]) -> [[f32; 3]; FEW] = together, FEW
+}
+
+#[inline(always)]
+fn picture_with<V: Vector>(mixture: &Packed, angles: [f32; 4], places: &Places, out: &mut [[f32; 3]]) {
+    let width = places.centres[0].len();
+    let mut lit = vec![[0.0; LANES]; mixture.input.len() / LANES];
+    shares_of_angles::<V>(mixture, angles, &mut lit);
+    for (row, line) in out.chunks_mut(width.max(1)).enumerate() {
+        for first in (0..width).step_by(FEW) {
+            let mut together = [places.at(mixture, [first, row]); FEW];
+            for k in 1..FEW.min(width - first) {
+                together[k] = places.at(mixture, [first + k, row]);
+            }
+            let found = colours::<V, FEW>(mixture, &lit, angles, &together);
+            for (texel, colour) in line[first..].iter_mut().zip(found) {
+                *texel = colour;
+            }
+        }
+    }
 }
 
 #[inline(always)]
@@ -125,133 +132,108 @@ pub(super) fn together<V: Vector, const N: usize>(
     angles: [f32; 4],
     places: &[Place<'_>; N],
 ) -> [[f32; 3]; N] {
-    let mut logs = [[[0.0; LANES]; N]; BLOCK];
-    let mut sums = Sums::<V, N>::none();
     let vectors = mixture.input.len() / LANES;
-    for first in (0..vectors).step_by(BLOCK) {
-        let logs = &mut logs[..BLOCK.min(vectors - first)];
-        let tops = log_densities::<V, N>(mixture, angles, places, first, logs);
-        sums.take(mixture, logs, tops, first);
-    }
-    sums.colours()
+    let (mut near, mut far) = ([[0.0; LANES]; ON_STACK], Vec::new());
+    let lit = if vectors <= ON_STACK {
+        &mut near[..vectors]
+    } else {
+        far.resize(vectors, [0.0; LANES]);
+        &mut far
+    };
+    shares_of_angles::<V>(mixture, angles, lit);
+    colours::<V, N>(mixture, lit, angles, places)
 }
 
-/// Log densities of all inputs, of the vectors of components from `first` on; the largest of each place.
+/// Components' densities of the angles, with their weights, over the largest.
 #[inline(always)]
-fn log_densities<V: Vector, const N: usize>(
-    mixture: &Packed,
-    angles: [f32; 4],
-    places: &[Place<'_>; N],
-    first: usize,
-    out: &mut [[Row; N]],
-) -> [f32; N] {
-    let count = out.len();
-    let bias = of_block(&mixture.input, first, count);
-    let mean = [2, 3, 4, 5].map(|v| of_block(&mixture.mean[v], first, count));
-    let scale = [2, 3, 4, 5].map(|v| of_block(&mixture.scale[v], first, count));
-    let mut tops = [V::splat(f32::NEG_INFINITY); N];
+fn shares_of_angles<V: Vector>(mixture: &Packed, angles: [f32; 4], out: &mut [Row]) {
+    let bias = of_vectors(&mixture.input, out.len());
+    let mean = [2, 3, 4, 5].map(|v| of_vectors(&mixture.mean[v], out.len()));
+    let scale = [2, 3, 4, 5].map(|v| of_vectors(&mixture.scale[v], out.len()));
+    let mut top = V::splat(f32::NEG_INFINITY);
     for (g, out) in out.iter_mut().enumerate() {
         let mut energy = V::load(&bias[g]);
-        for (v, angle) in angles.into_iter().enumerate() {
-            let off = V::splat(angle).minus(V::load(&mean[v][g]));
+        for v in 0..4 {
+            let off = V::splat(angles[v]).minus(V::load(&mean[v][g]));
             energy = energy.less_square(off.times(V::load(&scale[v][g])));
         }
+        energy.store(out);
+        top = top.larger(energy);
+    }
+    let top = V::splat(top.largest());
+    for out in out {
+        V::load(out).minus(top).exp().store(out);
+    }
+}
+
+/// `count` vectors.
+fn of_vectors(all: &[f32], count: usize) -> &[Row] {
+    &all.as_chunks().0[..count]
+}
+
+/// Colours less the mean, components' shares of the angles given.
+#[inline(always)]
+fn colours<V: Vector, const N: usize>(
+    mixture: &Packed,
+    lit: &[Row],
+    angles: [f32; 4],
+    places: &[Place<'_>; N],
+) -> [[f32; 3]; N] {
+    let shares: [[&[Row]; 2]; N] = std::array::from_fn(|p| places[p].map(|along| &along.shares[..lit.len()]));
+    let means = [0, 1, 2].map(|c| of_vectors(&mixture.mean[INPUTS + c], lit.len()));
+    // Of shares times red, green, blue, and of shares. Loops, for closures would not be compiled into the kernel.
+    let mut sums = [[V::splat(0.0); 4]; N];
+    for g in 0..lit.len() {
+        let lit = V::load(&lit[g]);
         for p in 0..N {
-            let [across, down] = places[p].map(|squares| &squares[first + g]);
-            let log = energy.minus(V::load(across)).minus(V::load(down));
-            log.store(&mut out[p]);
-            tops[p] = tops[p].larger(log);
-        }
-    }
-    let mut largest = [0.0; N];
-    for p in 0..N {
-        largest[p] = tops[p].largest();
-    }
-    largest
-}
-
-/// `count` vectors from `first` on.
-fn of_block(all: &[f32], first: usize, count: usize) -> &[Row] {
-    &all.as_chunks().0[first..][..count]
-}
-
-/// Sums over components as far as they were looked at, per place.
-///
-/// Loops, not closures, for those would not be compiled into the kernel.
-struct Sums<V, const N: usize> {
-    /// The largest logarithm so far: all sums are over its exponential.
-    best: [f32; N],
-    /// Of shares times red, green, blue, and of shares.
-    of: [[V; 4]; N],
-}
-
-impl<V: Vector, const N: usize> Sums<V, N> {
-    #[inline(always)]
-    fn none() -> Self {
-        Self { best: [f32::NEG_INFINITY; N], of: [[V::splat(0.0); 4]; N] }
-    }
-
-    /// Takes the vectors of components from `first` on in, of logarithms up to `tops`.
-    #[inline(always)]
-    fn take(&mut self, mixture: &Packed, logs: &[[Row; N]], tops: [f32; N], first: usize) {
-        self.raise(tops);
-        let colours = [0, 1, 2].map(|c| of_block(&mixture.mean[INPUTS + c], first, logs.len()));
-        let reach = V::splat(-REACH);
-        // In registers, not behind a reference.
-        let mut sums = self.of;
-        for (g, logs) in logs.iter().enumerate() {
-            let (mut below, mut nearest) = ([reach; N], V::splat(f32::NEG_INFINITY));
-            for p in 0..N {
-                below[p] = V::load(&logs[p]).minus(V::splat(self.best[p]));
-                nearest = nearest.larger(below[p]);
-            }
-            if nearest.at_least(reach) == 0 {
-                continue;
-            }
-            for p in 0..N {
-                // Nothing where it does not matter to this place: answers do not depend on what is asked for with it.
-                let share = below[p].exp().where_at_least(below[p], reach);
-                sums[p][3] = sums[p][3].plus(share);
-                for c in 0..3 {
-                    sums[p][c] = share.times_plus(V::load(&colours[c][g]), sums[p][c]);
-                }
-            }
-        }
-        self.of = sums;
-    }
-
-    /// Sums over the exponentials of larger logarithms.
-    #[inline(always)]
-    fn raise(&mut self, tops: [f32; N]) {
-        for ((best, sums), top) in self.best.iter_mut().zip(&mut self.of).zip(tops) {
-            if top > *best {
-                let factor = V::splat(if *best == f32::NEG_INFINITY { 0.0 } else { (*best - top).exp() });
-                for sum in sums {
-                    *sum = sum.times(factor);
-                }
-                *best = top;
-            }
-        }
-    }
-
-    #[inline(always)]
-    fn colours(&self) -> [[f32; 3]; N] {
-        let mut colours = [[0.0; 3]; N];
-        for (colour, sums) in colours.iter_mut().zip(&self.of) {
-            let total = sums[3].sum();
+            let [across, down] = shares[p];
+            let share = lit.times(V::load(&across[g])).times(V::load(&down[g]));
+            sums[p][3] = sums[p][3].plus(share);
             for c in 0..3 {
-                colour[c] = sums[c].sum() / total;
+                sums[p][c] = share.times_plus(V::load(&means[c][g]), sums[p][c]);
             }
         }
-        colours
     }
+    let mut colours = [[0.0; 3]; N];
+    for p in 0..N {
+        let total = sums[p][3].sum();
+        if total < ENOUGH {
+            colours[p] = by_logarithms(mixture, angles, &places[p]);
+            continue;
+        }
+        for c in 0..3 {
+            colours[p][c] = sums[p][c].sum() / total;
+        }
+    }
+    colours
+}
+
+/// The same as far from all components as may be.
+#[cold]
+fn by_logarithms(mixture: &Packed, angles: [f32; 4], place: &Place<'_>) -> [f32; 3] {
+    let log = |m: usize| {
+        let place = [0, 1].map(|axis| mixture.periods[axis].nearest_of(place[axis].place - mixture.mean[axis][m]));
+        let angles = [0, 1, 2, 3].map(|k| angles[k] - mixture.mean[2 + k][m]);
+        let offs = place.into_iter().chain(angles).enumerate();
+        mixture.input[m] - offs.map(|(v, off)| (off * mixture.scale[v][m]).powi(2)).sum::<f32>()
+    };
+    let logs: Vec<f32> = (0..mixture.count).map(log).collect();
+    let best = logs.iter().copied().fold(f32::NEG_INFINITY, f32::max);
+    let mut sums = [0.0; 4];
+    for (m, log) in logs.iter().enumerate() {
+        let share = (log - best).exp();
+        sums[3] += share;
+        (0..3).for_each(|c| sums[c] += share * mixture.mean[INPUTS + c][m]);
+    }
+    [0, 1, 2].map(|c| sums[c] / sums[3])
 }
 
 /// Mean squared difference between the pictures of `pairs` and what is expected of them, encoded units.
 pub(super) fn mean_square_error(grid: &Grid<'_>, mixture: &Packed, pairs: &[u32]) -> f64 {
+    let places = Places::of([grid.x.clone(), grid.y.clone()]);
     let of_pair = |&pair: &u32| {
         let pair = pair as usize;
-        let expected = picture(mixture, &grid.x, &grid.y, grid.angles(pair));
+        let expected = picture(mixture, &places, grid.angles(pair));
         let mean = grid.mean_colour(pair);
         let differences = grid.picture(pair).iter().zip(&expected).enumerate();
         differences.map(|(i, (measured, e))| f64::from(measured - (mean[i % 3] + e)).powi(2)).sum::<f64>()

@@ -4,6 +4,7 @@ use super::expectation::{Extent, Statistics, expect, expect_with};
 use super::lanes::{LANES, Plain, Row, Vector};
 use super::maximization::{SHAPES, maximise, reseed, spread, start};
 use super::mixture::{Component, Packed};
+use super::prediction::{Along, Places};
 use super::variables::{FLOORS, Grid, INPUTS, VARIABLES, onion_slice};
 use super::*;
 use crate::btf::container::{Reader, Stored, Writer};
@@ -257,6 +258,28 @@ fn leaving_components_out_costs_less_than_a_thousandth_of_the_likelihood() {
     assert!(evaluations < 36.0, "{evaluations} of 40 were evaluated");
 }
 
+/// Warm-up, components left out and put elsewhere: all of them, beside as many rounds of plain EM from the same start.
+#[test]
+fn the_fit_as_it_is_reaches_the_likelihood_of_plain_em() {
+    let lights: Vec<Vector3<f64>> = rings(12);
+    let btf = tile([8, 8], [lights.clone(), lights], stripes);
+    let (grid, pairs) = (Grid::of(&btf), all_pairs(&btf));
+    let samples = all_samples(&grid, &pairs);
+    let options = Options::new(&btf, Budget::Components(10), Precision::Full, 3).unwrap();
+    let found = estimate(&grid, &pairs, 10, &options);
+    assert!(800 * 10 < samples.len(), "there is a warm-up");
+    let mut plain = start(&grid, &pairs, 10, &found.shape, &FLOORS, options.seed);
+    let before = plain_round(&samples, grid.periods, &plain, &FLOORS).0;
+    for _ in 0..options.rounds {
+        plain = plain_round(&samples, grid.periods, &plain, &FLOORS).1;
+    }
+    let [ours, theirs] = [&found.components, &plain].map(|c| plain_round(&samples, grid.periods, c, &FLOORS).0);
+    // Units shift a likelihood: what counts is how far it has risen.
+    let risen = theirs - before;
+    println!("{} samples: rose by {risen}, plain; by {} less", samples.len(), theirs - ours);
+    assert!(risen > 0.1 && theirs - ours < 1e-3 * risen, "{ours} {theirs} after {before}");
+}
+
 /// Twenty rounds beside plain EM, on 16 × 16 texels under 27 × 27 directions.
 #[test]
 #[ignore = "half a minute: plain EM goes over 187 thousand samples and 60 components in every round"]
@@ -319,8 +342,8 @@ fn one_component_answers_the_mean_everywhere() {
 
 /// Colour less the mean where x, y and the angles are given.
 fn one(packed: &Packed, [x, y, la, ls, va, vs]: [f32; INPUTS]) -> [f32; 3] {
-    let exponents = [(0, x), (1, y)].map(|(axis, at)| prediction::exponents(packed, axis, at));
-    prediction::one(packed, [la, ls, va, vs], &[exponents.each_ref().map(Vec::as_slice)])[0]
+    let place = [(0, x), (1, y)].map(|(axis, at)| Along::at(packed, axis, at));
+    prediction::one(packed, [la, ls, va, vs], &[place.each_ref()])[0]
 }
 
 /// Components of equal deviations along x, with their positions as colours 0, 1, …
@@ -351,7 +374,7 @@ fn two_equal_components_share_by_a_logistic_curve() {
     let packed = Packed::new(&along_x(&[-1.0, 1.0], 0.8), Default::default());
     let found = one(&packed, [0.3, 0.0, 0.0, 0.0, 0.0, 0.0]);
     assert!((found[0] - 0.718_594).abs() < 1e-6, "{found:?}");
-    let picture = prediction::picture(&packed, &[0.3], &[0.0], [0.0; 4]);
+    let picture = prediction::picture(&packed, &Places::of([vec![0.3], vec![0.0]]), [0.0; 4]);
     assert!((picture[0] - 0.718_594).abs() < 1e-6, "{picture:?}");
 }
 
@@ -396,7 +419,7 @@ fn a_place_and_its_image_answer_alike() {
     }
     // 1 / (1 + exp((2.9² − 1.1²) / 2 · 0.8²)), and with 1.5² − 2.5².
     assert!((at(7.9) - 0.003_593_6).abs() < 1e-6 && (at(6.5) - 0.957_912).abs() < 1e-6, "{} {}", at(7.9), at(6.5));
-    let picture = prediction::picture(&packed, &[7.5, 6.25], &[0.0], [0.0; 4]);
+    let picture = prediction::picture(&packed, &Places::of([vec![7.5, 6.25], vec![0.0]]), [0.0; 4]);
     assert!((picture[0] - at(7.5)).abs() < 1e-6 && (picture[3] - at(6.25)).abs() < 1e-6, "{picture:?}");
 }
 
@@ -445,7 +468,42 @@ fn where_a_tile_begins_makes_no_difference() {
 fn far_from_all_components_the_nearest_answers() {
     let packed = Packed::new(&along_x(&[-1.0, 1.0], 0.01), Default::default());
     assert_eq!(one(&packed, [50.0, 50.0, 1.5, 1.0, 1.5, 1.0])[0], 1.0);
-    assert_eq!(prediction::picture(&packed, &[50.0], &[50.0], [1.5; 4])[0], 1.0);
+    assert_eq!(prediction::picture(&packed, &Places::of([vec![50.0], vec![50.0]]), [1.5; 4])[0], 1.0);
+}
+
+/// The formula of the module's head in `f64`.
+fn exact(components: &[Component], at: [f64; INPUTS]) -> [f64; 3] {
+    let log = |c: &Component| {
+        let terms = (0..INPUTS).map(|v| 0.5 * ((at[v] - c.mean[v]) / c.sigma[v]).powi(2) + c.sigma[v].ln());
+        c.weight.ln() - terms.sum::<f64>()
+    };
+    let logs: Vec<f64> = components.iter().map(log).collect();
+    let best = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let total: f64 = logs.iter().map(|l| (l - best).exp()).sum();
+    let share = |l: &f64| (l - best).exp() / total;
+    [0, 1, 2].map(|k| logs.iter().zip(components).map(|(l, c)| share(l) * c.mean[INPUTS + k]).sum())
+}
+
+#[test]
+fn products_of_shares_answer_as_logarithms_do_near_and_far() {
+    let numbers = |k: usize| [0.754_877_67, 0.569_840_29].map(|a: f64| (a * (k + 1) as f64).fract());
+    let component = |k: usize| {
+        let ([a, b], [c, d]) = (numbers(k), numbers(k + 1000));
+        let mean = [60.0 * a, 60.0 * b, 3.0 * c - 1.5, 2.0 * d - 1.0, 1.5 - 3.0 * b, 1.0 - 2.0 * a, a, b, c];
+        Component { weight: 1.0 / 90.0, mean, sigma: [1.0 + 4.0 * d, 2.0, 0.2, 0.3, 0.2, 0.3, 1.0, 1.0, 1.0] }
+    };
+    let components: Vec<Component> = (0..90).map(component).collect();
+    let packed = Packed::new(&components, Default::default());
+    // From the middle of a component's light and eye, where all is near, to where none is likely by e⁻¹⁰⁰⁰.
+    for k in 0..3000 {
+        let ([a, b], c) = (numbers(k + 77), components[k % 90].mean);
+        let away = k as f64 / 1000.0;
+        let at = [80.0 * a - 10.0, 80.0 * b - 10.0, c[2] + away * (a - 0.5), c[3], c[4] + away * (b - 0.5), c[5]];
+        let at = at.map(|v| f64::from(v as f32));
+        let (found, exact) = (one(&packed, at.map(|v| v as f32)), exact(&components, at));
+        // A logarithm of −1000 is rounded to 6e-5, and its share with it.
+        (0..3).for_each(|c| assert!((f64::from(found[c]) - exact[c]).abs() < 3e-4, "{at:?} {found:?} {exact:?}"));
+    }
 }
 
 #[test]
@@ -680,9 +738,8 @@ fn plain_loops_and_vector_instructions_agree() {
         assert!((a[0] - b[0]).abs() < 1e-4 * b[0] && (a[8] - b[8]).abs() < 1e-4 * b[8], "{a:?} {b:?}");
     }
     let at = [3.0, 4.0, 0.1, 0.2, -0.3, 0.4];
-    let exponents = [(0, 3.0), (1, 4.0)].map(|(axis, at)| prediction::exponents(&packed, axis, at));
-    let place = exponents.each_ref().map(Vec::as_slice);
-    let plain = prediction::together::<Plain, 1>(&packed, [0.1, 0.2, -0.3, 0.4], &[place]);
+    let place = [(0, 3.0), (1, 4.0)].map(|(axis, at)| Along::at(&packed, axis, at));
+    let plain = prediction::together::<Plain, 1>(&packed, [0.1, 0.2, -0.3, 0.4], &[place.each_ref()]);
     let [a, b] = [one(&packed, at), plain[0]];
     assert!((0..3).all(|c| (a[c] - b[c]).abs() < 1e-6), "{a:?} {b:?}");
 }
