@@ -85,6 +85,7 @@ fn masks(
         return Ok((0..files.len()).map(|i| Some(file(i))).collect());
     }
     let mut masks = vec![None; files.len()];
+    let mut still = 0;
     for take in 0..takes {
         let members: Vec<usize> = (0..files.len()).filter(|&i| sources[i].take == take).collect();
         let fetch = |i: usize| read_upright(&files[members[i]]);
@@ -92,13 +93,18 @@ fn masks(
         for (&i, matte) in members.iter().zip(&found) {
             write_matte(&file(i), matte)?;
             masks[i] = Some(file(i));
-            shots.shots[positions[i]].standpoint = Some(shots.standpoints.len());
         }
-        shots.standpoints.push(Standpoint { take, azimuth: None });
+        still += 1;
+        // Photographs before a dark or an even backdrop look so wherever they were taken from.
+        let is_film = members.first().is_some_and(|&i| sources[i].file.is_none());
+        if is_film {
+            members.iter().for_each(|&i| shots.shots[positions[i]].standpoint = Some(shots.standpoints.len()));
+            shots.standpoints.push(Standpoint { take, azimuth: None });
+        }
     }
-    let note = if shots.standpoints.len() == takes {
-        "the camera stands still: COLMAP sees what moves before it (give --masks where that is more than the object and \
-         what turns with it)"
+    let note = if still == takes {
+        "the border of the pictures stays the same: COLMAP sees what moves inside (give --masks where that is more than the \
+         object and what turns with it)"
     } else {
         "the camera was carried: COLMAP sees the room as well, which is right only if the object stood still (otherwise \
          --masks)"

@@ -2,10 +2,9 @@
 
 use super::look::look;
 use super::pictures::Taken;
-use super::{FootageOptions, Shot, Shots, Standpoint, by_colmap};
+use super::{FootageOptions, Shots, Standpoint, by_colmap};
 use crate::Error;
 use crate::stages::Stages;
-use capture::choose::PoseSource;
 use capture::footage::{Footage, FrameSource};
 use capture::turntable::{Axis, turned_camera};
 use capture::{Camera, Capture};
@@ -78,21 +77,13 @@ pub(super) fn needs_video(footage: &Footage) -> Error {
     ))
 }
 
-impl Shot {
-    /// Gives a frame its camera, where there is one.
-    pub(super) fn set_camera(&mut self, camera: Option<Camera>) {
-        self.camera = camera;
-        self.pose = if camera.is_some() { PoseSource::Measured } else { PoseSource::Missing };
-    }
-}
-
 /// Frames whose cameras were told elsewhere: of every photograph, of a film of any frames.
 fn calibrated(footage: &Footage, path: &Path, stages: &mut Stages<'_>) -> Result<Shots, Error> {
     let capture = Capture::read(path)?;
     refuse_twins(&footage.photographs())?;
     let size = capture.frames.first().map(|frame| [frame.camera.intrinsics.width, frame.camera.intrinsics.height]);
     let mut shots = look(footage, size, stages)?;
-    let (takes, numbered) = (shots.takes(), FilmCameras::of(&capture, path)?);
+    let (takes, numbered) = (shots.takes(), FilmCameras::of(&capture, path));
     for shot in &mut shots.shots {
         let camera = match shot.source.file {
             Some(_) => Some(camera_of(&shot.source, &capture, path)?),
@@ -154,21 +145,19 @@ struct ReportedFrame {
 }
 
 impl FilmCameras {
-    fn of(capture: &Capture, path: &Path) -> Result<Self, Error> {
-        let file = path.join("report.json");
-        if let Ok(text) = std::fs::read_to_string(&file) {
-            let report: Report = serde_json::from_str(&text).map_err(|fault| {
-                Error::Failed(format!("{}: is no report of a capture ({fault}); remove it", file.display()))
-            })?;
+    fn of(capture: &Capture, path: &Path) -> Self {
+        let text = std::fs::read_to_string(path.join("report.json")).ok();
+        // What is called so and is none of ours says nothing.
+        if let Some(report) = text.and_then(|text| serde_json::from_str::<Report>(&text).ok()) {
             let camera = |frame: ReportedFrame| Some((frame.name, capture.frames.get(frame.kept?)?.camera));
-            return Ok(Self::Reported(report.frames.into_iter().filter_map(camera).collect()));
+            return Self::Reported(report.frames.into_iter().filter_map(camera).collect());
         }
         let name = |part: Option<&std::ffi::OsStr>| part.map(|s| s.to_string_lossy().into_owned());
         let camera = |frame: &capture::Frame| {
             let number = name(frame.image_path.file_stem())?.parse().ok()?;
             Some(((name(frame.image_path.parent()?.file_name()).unwrap_or_default(), number), frame.camera))
         };
-        Ok(Self::Numbered(capture.frames.iter().filter_map(camera).collect()))
+        Self::Numbered(capture.frames.iter().filter_map(camera).collect())
     }
 
     /// Of several takes each has a folder of its name.

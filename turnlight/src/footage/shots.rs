@@ -53,6 +53,12 @@ impl Shot {
             fault: None,
         }
     }
+
+    /// Gives the frame its camera from elsewhere, where there is one.
+    pub(super) fn set_camera(&mut self, camera: Option<Camera>) {
+        self.camera = camera;
+        self.pose = if camera.is_some() { PoseSource::Measured } else { PoseSource::Missing };
+    }
 }
 
 /// Where the camera stood while the table turned.
