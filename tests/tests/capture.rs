@@ -463,11 +463,13 @@ fn a_film_without_a_board_takes_cameras_from_elsewhere() {
     let (hidden, all) = of_room.fold((0, 0), |(hidden, all), at| (hidden + usize::from(room(at)), all + 1));
     assert!(hidden * 100 > all * 95, "{hidden} of {all} pixels of the room are masked");
     assert!(iou(&seen, object) > 0.5, "{}", iou(&seen, object));
-    // A capture of the film has the cameras of its frames, by its report: some are left out of it.
-    let (report, captured) = done(place, &["film.mp4", "--cameras", "found", "--frames", "9"], "again");
-    assert_eq!(captured.frames.len(), 9);
-    for (frame, at) in captured.frames.iter().zip(positions(&report)) {
-        assert!((frame.camera.center() - drawn[at].camera.center()).norm() < 1e-6);
+    // A capture of the film has the cameras of its frames by its report, any other by their numbers.
+    for (cameras, again) in [("found", "again"), ("model", "numbered")] {
+        let (report, captured) = done(place, &["film.mp4", "--cameras", cameras, "--frames", "9"], again);
+        assert_eq!(captured.frames.len(), 9);
+        for (frame, at) in captured.frames.iter().zip(positions(&report)) {
+            assert!((frame.camera.center() - drawn[at].camera.center()).norm() < 1e-6, "{cameras} {at}");
+        }
     }
     // The first of them and an even turn of 15° a sixth of a second.
     let refused = turnlight(place, &["capture", "film.mp4", "--step", "90", "-o", "even"]);
