@@ -22,7 +22,7 @@ impl Set {
         let (width, height) = (96, 72);
         let effort = Effort::Samples(2);
         let options = SynthOptions { views: 12, width, height, effort, surfaces: 1, ..SynthOptions::default() };
-        synthesize(Scene::Temple, &options).unwrap().write(&folder.path().join("capture")).unwrap();
+        synthesize(Scene::Temple, &options).unwrap().write(folder.path().join("capture")).unwrap();
         let capture = Capture::read(&folder.path().join("capture")).unwrap();
         std::fs::create_dir(folder.path().join("photographs")).unwrap();
         for frame in &capture.frames {
