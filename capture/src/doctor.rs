@@ -1,5 +1,6 @@
 //! Checks a capture, and names the likely cause where something is off.
 
+use crate::outlines::outline_offset;
 use crate::votes::{Votes, nearest_to_rays, rough_box};
 use crate::{Aabb, Camera, Capture, Image, MaskSource, View};
 use nalgebra::{Matrix3, Point2, Point3, Vector3};
@@ -35,6 +36,9 @@ pub struct CaptureCheck {
     pub silhouette_consistency: f64,
     /// The same with all principal points moved by half a pixel up and left, and down and right.
     pub consistency_half_pixel: [f64; 2],
+    /// Whole pixels by which the silhouettes' outlines lie outside of the edges in the pictures, on the whole; negative:
+    /// inside. `None` where no edge follows them within 11 pixels.
+    pub outline_offset_px: Option<i32>,
     /// How the cameras stand about the object.
     pub layout: Layout,
     /// Each checked frame.
@@ -109,6 +113,7 @@ pub fn check(capture: &Capture, views: &[View]) -> CaptureCheck {
         silhouette_iou: ious.iter().sum::<f64>() / ious.len().max(1) as f64,
         silhouette_consistency: consistency(0.0),
         consistency_half_pixel: [consistency(-0.5), consistency(0.5)],
+        outline_offset_px: outline_offset(views),
         layout: layout(views, center),
         views: views_checked,
         findings: Vec::new(),
@@ -147,6 +152,9 @@ fn hull_ious(object_box: Option<&Aabb>, views: &[(&Camera, &Image<u8>)]) -> Vec<
     };
     views.par_iter().map(iou).collect()
 }
+
+/// Outlines this many pixels from the edges in the pictures are worth a word.
+const LARGEST_OFFSET: i32 = 3;
 
 /// Rays of a view that are followed in the consistency test.
 const RAYS: usize = 40;
@@ -285,6 +293,11 @@ fn findings(found: &CaptureCheck, views: &[View], pairs: &[(&Camera, &Image<u8>)
     }
     if let Some(finding) = half_pixel_finding(found) {
         findings.push(finding);
+    }
+    if let Some(off) = found.outline_offset_px.filter(|off| !is_inverted && off.abs() >= LARGEST_OFFSET) {
+        let (size, remedy) = if off > 0 { ("large", "erode") } else { ("small", "grow") };
+        let off = off.abs();
+        findings.push(format!("the masks are some {off} pixels too {size} all around: {remedy} them by so many"));
     }
     let cut = listed(&|v| !v.is_complete);
     if !cut.is_empty() && !is_inverted {

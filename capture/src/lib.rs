@@ -30,6 +30,7 @@ pub mod light;
 mod load;
 mod masks;
 mod matte;
+mod outlines;
 mod pixels;
 #[cfg(feature = "video")]
 mod saddle;

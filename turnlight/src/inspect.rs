@@ -175,6 +175,10 @@ pub fn capture_text(format: &str, check: &CaptureCheck) -> String {
         lines.push(format!("the object leaves the frame in views {leaving:?}"));
     }
     lines.push(format!("silhouettes agree with a coarse hull of them to {:.3} (IoU)", check.silhouette_iou));
+    if let Some(off) = check.outline_offset_px {
+        let side = if off < 0 { "inside" } else { "outside" };
+        lines.push(format!("their outlines lie {} pixels {side} of the edges in the pictures", off.abs()));
+    }
     match check.findings.as_slice() {
         [] => lines.push("nothing looks wrong".to_owned()),
         findings => lines.extend(findings.iter().map(|finding| format!("warning: {finding}"))),
