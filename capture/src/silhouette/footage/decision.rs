@@ -16,8 +16,12 @@ const TRUST: f32 = 0.5;
 const BORDER: f32 = 7.5;
 
 /// A hole of which more than this share is object for the other views, in colours that the object shows elsewhere, is a
-/// patch of the background's colour.
+/// patch of the background's colour, where the background has one.
 const LARGEST_SOLID: f64 = 0.7;
+
+/// What is behind a hole has one colour if it varies by less (standard deviation of the mean of its channels, encoded
+/// levels). Print that shows through as it should is no patch.
+const ONE_COLOUR: f64 = 15.0;
 
 /// Object (255) or not, for voting where no hull is known yet: in between where the odds are even.
 pub(super) fn guessed(log_odds: &Image<f32>) -> Image<u8> {
@@ -46,7 +50,7 @@ pub(super) fn decided(
     let width = hull.width();
     let is_patch =
         |at: usize| hull.pixels()[at] >= 128 && patches.is_some_and(|p| p.has(&picture.at(at % width, at / width)));
-    without_specks(&mask, &is_patch)
+    without_specks(&mask, &odds.background, &is_patch)
 }
 
 /// Log odds as whole numbers: flow in these ends, and is the same everywhere.
@@ -72,17 +76,49 @@ fn borders(picture: &Toned, width: usize, height: usize) -> [Image<i32>; 2] {
 }
 
 /// Drops parts below a hundredth of the largest, fills holes below a two-thousandth of the object and those of which most
-/// pixels are patches of it.
-fn without_specks(mask: &Image<bool>, is_patch: &dyn Fn(usize) -> bool) -> Image<u8> {
+/// pixels are patches of it, before a background of one colour.
+fn without_specks(
+    mask: &Image<bool>,
+    background: &Image<Option<[f32; 3]>>,
+    is_patch: &dyn Fn(usize) -> bool,
+) -> Image<u8> {
     let (sizes, labels) = components(mask);
     let largest = sizes.iter().max().copied().unwrap_or(0);
     let kept = labels.map(|l| l > 0 && sizes[l as usize - 1] * 100 >= largest);
     let object = kept.pixels().iter().filter(|k| **k).count();
-    let (holes, labels) = components(&kept.map(|k| !k));
-    let mut solid = vec![0_usize; holes.len()];
+    let (sizes, labels) = components(&kept.map(|k| !k));
+    let mut holes: Vec<Hole> = sizes.iter().map(|&size| Hole { size, ..Hole::default() }).collect();
     for (at, &label) in labels.pixels().iter().enumerate().filter(|(_, l)| **l > 0) {
-        solid[label as usize - 1] += usize::from(is_patch(at));
+        holes[label as usize - 1].take(background.pixels()[at], is_patch(at));
     }
-    let is_open = |hole: usize| holes[hole] > object / 2000 && solid[hole] as f64 <= LARGEST_SOLID * holes[hole] as f64;
-    labels.map(|l| if l > 0 && is_open(l as usize - 1) { 0 } else { 255 })
+    let is_open = |hole: &Hole| hole.size > object / 2000 && !hole.is_patch();
+    labels.map(|l| if l > 0 && is_open(&holes[l as usize - 1]) { 0 } else { 255 })
+}
+
+/// A hole in the object.
+#[derive(Clone, Copy, Debug, Default)]
+struct Hole {
+    /// Pixels.
+    size: usize,
+    /// Of them, those that may be patches of the object.
+    solid: usize,
+    /// Those whose background is known; sums of its levels, and of their squares.
+    known: [f64; 3],
+}
+
+impl Hole {
+    fn take(&mut self, background: Option<[f32; 3]>, is_solid: bool) {
+        self.solid += usize::from(is_solid);
+        if let Some(colour) = background {
+            let level = f64::from(colour.iter().sum::<f32>()) / 3.0;
+            self.known = [self.known[0] + 1.0, self.known[1] + level, self.known[2] + level * level];
+        }
+    }
+
+    fn is_patch(&self) -> bool {
+        let [count, sum, squares] = self.known;
+        let mean = sum / count.max(1.0);
+        let variance = squares / count.max(1.0) - mean * mean;
+        self.solid as f64 > LARGEST_SOLID * self.size as f64 && variance < ONE_COLOUR * ONE_COLOUR
+    }
 }

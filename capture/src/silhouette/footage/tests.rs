@@ -437,6 +437,27 @@ fn a_hole_is_filled_where_the_object_has_the_colour_seen_in_it() {
     }
 }
 
+/// Squares show between the legs of an object that is black and white itself, and the hull does not look through there.
+#[test]
+fn a_hole_is_open_where_the_print_shows_in_it() {
+    let (paper, ink, glaze) = ([200, 198, 190], [42, 42, 40], [180, 50, 40]);
+    let print =
+        Image::from_pixels(40, 40, (0..1600).map(|at| if at / 40 < 20 { paper } else { ink }).collect()).unwrap();
+    let (mut picture, mut hull) = (print.clone(), Image::filled(40, 40, 0));
+    for (x, y) in (8..32).flat_map(|y| (8..32).map(move |x| (x, y))) {
+        hull.set(x, y, 255);
+        if !(15..25).contains(&x) || !(15..25).contains(&y) {
+            picture.set(x, y, glaze);
+        }
+    }
+    let log_odds = picture.map(|p| if p == glaze { 8.0 } else { -8.0 });
+    let odds = Odds { log_odds, background: print.map(|p| Some(p.map(f32::from))) };
+    let picture = light::Toned::new(picture, &[1.0; 3]);
+    let shown = [paper, ink, glaze].into_iter().cycle().take(9000).map(|colour| colour.map(f32::from));
+    let mask = decision::decided(&picture, &odds, &hull, 0.5, Some(&palette::Palette::learned(shown)));
+    assert_eq!((mask.at(20, 17), mask.at(20, 23), mask.at(10, 20)), (0, 0, 255));
+}
+
 /// Paper and ink in the shadow of something round; where it stands nothing is seen.
 #[test]
 fn shadow_that_turns_with_the_target_is_known_where_little_of_it_is_seen() {
