@@ -13,6 +13,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use tests::hostile::{Hostile, coated_twice, hostile};
 use tests::played::{COMPARED, Played, SHARE, agreement, frame, played};
+use texture::btf::multilevel_vq::Variant;
 use texture::btf::{self, Budget, CodecKind, Precision};
 use texture::{MaterialLayer, Method, Model};
 use turnlight::export::web::Site;
@@ -120,7 +121,7 @@ fn coated(glb: &[u8]) -> Model {
         measured: Vec::new(),
     };
     let (codec, budget) = (CodecKind::Ptm, Budget::Standard);
-    let options = btf::FitOptions { codec, budget, precision: Precision::Full, seed: 1 };
+    let options = btf::FitOptions { codec, budget, precision: Precision::Full, seed: 1, books: Variant::default() };
     let (bytes, _) = btf::fit(btf.encoded(Encoding::Srgb), &options).expect("a fit").0.to_bytes();
     let mut model = Model::from_glb(glb, Path::new("memory")).expect("a model");
     let charts = (0..model.number_charts() as u32).step_by(2).collect();

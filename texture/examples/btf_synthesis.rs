@@ -6,6 +6,7 @@
 use capture::btf::{Btf, read_folder};
 use nalgebra::Vector3;
 use std::path::Path;
+use texture::btf::multilevel_vq::Variant;
 use texture::btf::statistics::{TextureStatistics, compare};
 use texture::btf::{Answer, Budget, CodecKind, FitOptions, Material, Precision, fit};
 
@@ -38,7 +39,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             paste(&mut sheet, btf.picture(view, light), [btf.width, btf.height], [0, y]);
         }
         for (column, codec) in KINDS.into_iter().enumerate() {
-            let options = FitOptions { codec, budget, precision: Precision::Compact, seed: 1 };
+            let options =
+                FitOptions { codec, budget, precision: Precision::Compact, seed: 1, books: Variant::default() };
             let start = cpu_seconds();
             let (material, report) = fit(btf.clone(), &options)?;
             let seconds = cpu_seconds() - start;

@@ -10,6 +10,7 @@
 use capture::btf::{Btf, read_folder};
 use nalgebra::Vector3;
 use std::time::Instant;
+use texture::btf::multilevel_vq::Variant;
 use texture::btf::{Answer, Budget, CodecKind, FitOptions, Material, Precision, Sampler, fit, to_coded_range};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -18,7 +19,13 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut btf = read_folder(folder.as_ref(), None)?;
     btf.check()?;
     let precision = if rest.is_empty() { Precision::Compact } else { Precision::Full };
-    let options = FitOptions { codec: codec.parse::<CodecKind>()?, budget: parse(budget)?, precision, seed: 1 };
+    let options = FitOptions {
+        codec: codec.parse::<CodecKind>()?,
+        budget: parse(budget)?,
+        precision,
+        seed: 1,
+        books: Variant::default(),
+    };
     let truth = to_coded_range(btf.clone());
     let start = cpu_seconds();
     let (material, report) = fit(btf, &options)?;

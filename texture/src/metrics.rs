@@ -17,8 +17,10 @@
 //!
 //! SSIM is that of Wang, Bovik, Sheikh and Simoncelli, "Image Quality Assessment: From Error Visibility
 //! to Structural Similarity", 2004 (eq. 13): Gaussian window of σ = 1.5 cut at 3.5 σ (11 taps),
-//! `K₁ = 0.01`, `K₂ = 0.03`, range 255, population covariance, borders mirrored about the edge of the
-//! outermost pixel.
+//! `K₁ = 0.01`, `K₂ = 0.03`, range 255, population covariance. Borders are mirrored about the edge of the
+//! outermost pixel, as SciPy and scikit-image do, where the authors take windows inside the picture alone: masks
+//! touch borders, tiles of materials are as small as the window, and each pixel then counts once. What is no
+//! number makes no number of the windows that hold it, and of no other.
 
 use crate::TextureError;
 use capture::Image;
@@ -300,6 +302,52 @@ mod tests {
         let c1 = 2.55 * 2.55;
         let expected = (2.0 * 100.0 * 150.0 + c1) / (100.0 * 100.0 + 150.0 * 150.0 + c1);
         assert!(map.iter().all(|s| (s - expected).abs() < 1e-9));
+    }
+
+    const SIDE: usize = 40;
+
+    /// 100 ± 20 in turn: under the window mean 100 and variance 400 to nine digits.
+    fn checked(amplitude: f64) -> Vec<f64> {
+        (0..SIDE * SIDE)
+            .map(|p| 100.0 + if (p % SIDE + p / SIDE).is_multiple_of(2) { amplitude } else { -amplitude })
+            .collect()
+    }
+
+    /// Away from the border, where mirrored pixels do not take turns.
+    fn inner(x: &[f64], y: &[f64]) -> Vec<f64> {
+        let map = ssim_map(x, y, SIDE, SIDE);
+        let is_inner = |p: &usize| [p % SIDE, p / SIDE].iter().all(|at| (SSIM_RADIUS..SIDE - SSIM_RADIUS).contains(at));
+        (0..map.len()).filter(is_inner).map(|p| map[p]).collect()
+    }
+
+    #[test]
+    fn ssim_of_contrast_has_its_closed_form() {
+        for (amplitude, known) in [(20.0, 1.0), (10.0, 0.820_956), (-20.0, -0.863_667)] {
+            let found = inner(&checked(20.0), &checked(amplitude));
+            assert!(found.iter().all(|s| (s - known).abs() < 1e-6), "{amplitude}: {}", found[0]);
+        }
+        let map = |a: f64, b: f64| ssim_map(&[a; 300], &[b; 300], 20, 15)[140];
+        assert!((map(100.0, 110.0) - 0.995_476).abs() < 1e-6 && (map(0.0, 255.0) - 9.999e-5).abs() < 1e-8);
+    }
+
+    #[test]
+    fn ssim_is_symmetric_and_one_of_the_same() {
+        let ramp: Vec<f64> = (0..SIDE * SIDE).map(|p| ((p * 7919) % 256) as f64).collect();
+        assert_eq!(ssim_map(&ramp, &checked(20.0), SIDE, SIDE), ssim_map(&checked(20.0), &ramp, SIDE, SIDE));
+        assert!(ssim_map(&ramp, &ramp, SIDE, SIDE).iter().all(|s| *s == 1.0));
+        // Smaller than the window.
+        assert!(ssim_map(&ramp[..25], &ramp[..25], 5, 5).iter().all(|s| *s == 1.0));
+    }
+
+    #[test]
+    fn what_is_no_number_spoils_the_windows_that_hold_it_alone() {
+        let mut broken = checked(20.0);
+        broken[20 * SIDE + 20] = f64::NAN;
+        let map = ssim_map(&broken, &checked(20.0), SIDE, SIDE);
+        for (p, s) in map.iter().enumerate() {
+            let is_near = [p % SIDE, p / SIDE].iter().all(|at| at.abs_diff(20) <= SSIM_RADIUS);
+            assert_eq!(s.is_nan(), is_near, "{p}");
+        }
     }
 
     #[test]

@@ -14,6 +14,7 @@ use std::f32::consts::PI;
 use std::path::Path;
 use std::sync::LazyLock;
 use support::{all_around, ball, cast_cube, cube, film, fit, glossy, ring, usual};
+use texture::btf::multilevel_vq::Variant;
 use texture::btf::{self, Budget, CodecKind, Precision};
 use texture::{EXTENSION, MaterialLayer, Method, Model};
 
@@ -48,7 +49,7 @@ fn paint(charts: &[u32], albedo: [f32; 3]) -> MaterialLayer {
     };
     let btf = btf.encoded(Encoding::Srgb);
     let (codec, budget) = (CodecKind::Ptm, Budget::Standard);
-    let options = btf::FitOptions { codec, budget, precision: Precision::Full, seed: 1 };
+    let options = btf::FitOptions { codec, budget, precision: Precision::Full, seed: 1, books: Variant::default() };
     let (bytes, _) = btf::fit(btf, &options).unwrap().0.to_bytes();
     MaterialLayer::new(charts.to_vec(), 0.5, bytes).unwrap()
 }

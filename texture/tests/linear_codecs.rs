@@ -4,6 +4,7 @@ use capture::btf::{Btf, Encoding, bonn_directions};
 use nalgebra::Vector3;
 use proptest::prelude::*;
 use texture::btf::container::{Fault, Reader, Stored, Writer};
+use texture::btf::multilevel_vq::Variant;
 use texture::btf::{
     Answer, Budget, Codec, CodecKind, FitOptions, Frame, Material, Precision, Sampler, fit, lafortune, local_pca, pca,
     pca_view, ptm,
@@ -58,7 +59,7 @@ fn stripes() -> Btf {
 }
 
 fn coded(btf: &Btf, codec: CodecKind, budget: Budget, precision: Precision) -> Material {
-    fit(btf.clone(), &FitOptions { codec, budget, precision, seed: 7 }).expect("a fit").0
+    fit(btf.clone(), &FitOptions { codec, budget, precision, seed: 7, books: Variant::default() }).expect("a fit").0
 }
 
 fn sampler(material: &Material) -> &dyn Sampler {
@@ -252,7 +253,8 @@ fn samples_that_are_no_numbers_and_bad_budgets_are_refused() {
     let mut broken = stripes();
     broken.samples[5] = f32::NAN;
     for codec in KINDS {
-        let options = |budget| FitOptions { codec, budget, precision: Precision::Full, seed: 0 };
+        let options =
+            |budget| FitOptions { codec, budget, precision: Precision::Full, seed: 0, books: Variant::default() };
         assert!(fit(broken.clone(), &options(Budget::Standard)).is_err(), "{codec}");
         assert!(fit(stripes(), &options(Budget::Ratio(-1.0))).is_err(), "{codec}");
     }

@@ -9,6 +9,7 @@ use turnlight::export::web::AXES;
 use turnlight::render;
 use turnlight::scene::MOST_OBJECTS;
 use turnlight::swatch::Shape;
+use turnlight::texture::btf::multilevel_vq::{ColorSpace, Measure, Variant};
 use turnlight::texture::btf::{Budget, CodecKind, Precision};
 use turnlight::viewer::Panel;
 
@@ -237,8 +238,12 @@ pub(crate) enum PrecisionArg {
 
 #[derive(Debug, Args)]
 pub(crate) struct BtfFitArgs {
-    #[command(flatten)]
-    pub(crate) data: BtfDataArgs,
+    /// Folders of pictures named by angles, .lp lists of lights, .btf or .binary files; several share one set of books
+    #[arg(required = true)]
+    pub(crate) data: Vec<PathBuf>,
+    /// Take the middle N × N texels alone
+    #[arg(long, value_name = "N", value_parser = texels)]
+    pub(crate) crop: Option<usize>,
     /// The file to write
     #[arg(short, long, value_name = "FILE.btfz")]
     pub(crate) output: PathBuf,
@@ -253,6 +258,41 @@ pub(crate) struct BtfFitArgs {
     /// Seed of everything random
     #[arg(long, default_value = "1")]
     pub(crate) seed: u64,
+    #[command(flatten)]
+    pub(crate) books: BookArgs,
+}
+
+/// What may be chosen of books.
+#[derive(Clone, Copy, Debug, Args)]
+#[command(next_help_heading = "Books of multilevel-vq")]
+pub(crate) struct BookArgs {
+    /// How an item is found to stand for a slice
+    #[arg(long, value_enum, default_value = "rmse")]
+    pub(crate) measure: MeasureArg,
+    /// How colours stand in the books
+    #[arg(long, value_enum, default_value = "ycrcb")]
+    pub(crate) color: ColorArg,
+    /// Keep the smaller sizes too, down to one texel
+    #[arg(long)]
+    pub(crate) mip_maps: bool,
+}
+
+/// How an item is found to stand for a slice.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(crate) enum MeasureArg {
+    /// Root mean squared error
+    Rmse,
+    /// Structural similarity of 98 % of windows
+    Ssim,
+}
+
+/// How colours stand in the books.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(crate) enum ColorArg {
+    /// Luma and two differences of encoded samples
+    Ycrcb,
+    /// Logarithm of luminance, and chromaticity; of a high range
+    Logluv,
 }
 
 /// How large a coded material may be; by default, what the codec's authors used.
@@ -276,6 +316,9 @@ pub(crate) struct BtfEvalArgs {
     pub(crate) material: PathBuf,
     #[command(flatten)]
     pub(crate) data: BtfDataArgs,
+    /// Which of the materials that share the file, counted from 0
+    #[arg(long, value_name = "N", default_value = "0")]
+    pub(crate) member: usize,
     /// Write original, decoded, and ten times their difference
     #[arg(long, value_name = "FILE.png")]
     pub(crate) sheet: Option<PathBuf>,
@@ -309,6 +352,9 @@ pub(crate) struct BtfCompareArgs {
 pub(crate) struct BtfRenderArgs {
     /// The coded material
     pub(crate) material: PathBuf,
+    /// Which of the materials that share the file, counted from 0
+    #[arg(long, value_name = "N", default_value = "0")]
+    pub(crate) member: usize,
     /// The picture to write
     #[arg(short, long, value_name = "FILE.png")]
     pub(crate) output: PathBuf,
@@ -364,6 +410,20 @@ pub(crate) struct MaterialArg {
     pub(crate) charts: Selection,
     pub(crate) file: PathBuf,
     pub(crate) tile_size: Option<f64>,
+}
+
+impl BookArgs {
+    pub(crate) fn variant(self) -> Variant {
+        let measure = match self.measure {
+            MeasureArg::Rmse => Measure::Rmse,
+            MeasureArg::Ssim => Measure::Ssim,
+        };
+        let color = match self.color {
+            ColorArg::Ycrcb => ColorSpace::YCrCb,
+            ColorArg::Logluv => ColorSpace::LogLuv,
+        };
+        Variant { measure, color, mip_maps: self.mip_maps }
+    }
 }
 
 impl From<PrecisionArg> for Precision {

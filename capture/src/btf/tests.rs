@@ -81,6 +81,34 @@ fn angles_are_read_from_names_and_missing_pairs_filled() {
 }
 
 #[test]
+fn floats_are_read_as_linear_radiance() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, radiance) in [("tl000 pl000 tv000 pv000.exr", 0.125), ("tl060 pl090 tv000 pv000.exr", 25_000.0)] {
+        let texel = |x: u32, y: u32| image::Rgb([radiance, radiance * x as f32, radiance * y as f32]);
+        image::Rgb32FImage::from_fn(3, 2, texel).save(folder.path().join(name)).unwrap();
+    }
+    let btf = read_folder(folder.path(), None).unwrap();
+    assert_eq!((btf.encoding, btf.views.len(), btf.lights.len()), (Encoding::Linear, 1, 2));
+    let expected = |radiance: f32| [0.0, 1.0].map(|y| [0.0, 1.0, 2.0].map(|x| [radiance, radiance * x, radiance * y]));
+    for (light, radiance) in [(0, 0.125), (1, 25_000.0)] {
+        assert_eq!(btf.picture(0, light), expected(radiance).as_flattened().as_flattened(), "{light}");
+    }
+    // 12 bits a sample.
+    assert_eq!(btf.raw_bytes(), 2 * 6 * 3 * 12 / 8);
+}
+
+/// A hole of one channel is filled from the other light.
+#[test]
+fn floats_that_are_no_numbers_are_filled() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, first) in [("tl000 pl000 tv000 pv000.exr", f32::NAN), ("tl060 pl090 tv000 pv000.exr", 7.0)] {
+        let texel = |x: u32, y: u32| image::Rgb([if (x, y) == (0, 0) { first } else { 1.0 }, 2.0, 3.0]);
+        image::Rgb32FImage::from_fn(3, 2, texel).save(folder.path().join(name)).unwrap();
+    }
+    assert_eq!(read_folder(folder.path(), None).unwrap().picture(0, 0)[..4], [7.0, 2.0, 3.0, 1.0]);
+}
+
+#[test]
 fn two_pictures_of_one_pair_are_refused() {
     let folder = folder(&[("0 tl000 pl000 tv000 pv000.png", 1), ("1 tl000 pl360 tv000 pv000.png", 2)]);
     assert!(read(folder.path(), None).unwrap_err().to_string().contains("same view and light"));

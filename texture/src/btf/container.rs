@@ -341,7 +341,7 @@ pub(super) fn header_bytes(btf: &Btf) -> usize {
 }
 
 /// As much of a name as a file holds.
-fn stored_name(name: &str) -> &str {
+pub(super) fn stored_name(name: &str) -> &str {
     let end = (0..=name.len().min(255)).rev().find(|&i| name.is_char_boundary(i)).unwrap_or(0);
     &name[..end]
 }
@@ -386,12 +386,15 @@ fn write_directions(directions: &[Vector3<f64>], out: &mut Writer) {
     directions.iter().for_each(|d| out.f32s(&[d.x as f32, d.y as f32]));
 }
 
+pub(super) fn read_name(from: &mut Reader<'_>) -> Result<String, Fault> {
+    let length = usize::from(from.u8()?);
+    let name = std::str::from_utf8(from.take(length)?);
+    name.map(str::to_owned).map_err(|fault| Fault(format!("its name is no UTF-8: {fault}")))
+}
+
 /// All but the codec.
 fn read_header(from: &mut Reader<'_>) -> Result<(impl FnOnce(Codec) -> Material + use<>, Frame), Fault> {
-    let length = usize::from(from.u8()?);
-    let name =
-        std::str::from_utf8(from.take(length)?).map_err(|fault| Fault(format!("its name is no UTF-8: {fault}")))?;
-    let name = name.to_owned();
+    let name = read_name(from)?;
     let encoding = match from.u8()? {
         0 => Encoding::Srgb,
         1 => Encoding::Linear,
@@ -439,7 +442,8 @@ fn read_directions(from: &mut Reader<'_>) -> Result<Vec<Vector3<f64>>, Fault> {
     flat.chunks_exact(2).map(direction).collect()
 }
 
-fn checksum(bytes: &[u8]) -> u32 {
+/// CRC-32 of a file's bytes, zeros in the place where it stands.
+pub fn checksum(bytes: &[u8]) -> u32 {
     let mut crc = flate2::Crc::new();
     let (head, tail) = bytes.split_at(CHECKSUM_AT.min(bytes.len()));
     crc.update(head);

@@ -51,6 +51,7 @@ pub use tables::{MixtureComponent, MixtureTables, Tables, VqTables};
 
 use crate::TextureError;
 use capture::btf::{Btf, Encoding};
+use multilevel_vq::Label;
 use nalgebra::Vector3;
 use std::str::FromStr;
 
@@ -160,6 +161,8 @@ pub struct FitOptions {
     pub precision: Precision,
     /// Of everything random; the same seed gives the same bytes.
     pub seed: u64,
+    /// What else the books of [`CodecKind::MultilevelVq`] shall be; other codecs have none.
+    pub books: multilevel_vq::Variant,
 }
 
 /// What happened during a fit.
@@ -309,40 +312,101 @@ impl Codec {
 /// # Errors
 /// Where the data cannot carry the codec, or an option is out of range.
 pub fn fit(btf: Btf, options: &FitOptions) -> Result<(Material, FitReport), TextureError> {
-    if let Some(fault) = container::unstorable(btf.width, btf.height, btf.views.len(), btf.lights.len()) {
+    fit_shared(vec![btf], options)
+}
+
+/// Fits several materials at once, to books that all share; the first is shown, [`Material::member`] gives the others. Data of
+/// a high range are brought to one logarithm.
+///
+/// # Errors
+/// As [`fit`], and where there are none, or several and the codec has no books.
+pub fn fit_shared(btfs: Vec<Btf>, options: &FitOptions) -> Result<(Material, FitReport), TextureError> {
+    let unstorable = |b: &Btf| container::unstorable(b.width, b.height, b.views.len(), b.lights.len());
+    if let Some(fault) = btfs.iter().find_map(unstorable) {
         let remedy = "cut out a smaller part, 2048 × 2048 texels and 1024 × 1024 directions at most".to_owned();
         return Err(TextureError::Degenerate { fault: format!("no file holds {fault}"), remedy });
     }
-    let raw_bytes = btf.raw_bytes();
-    let btf = to_coded_range(btf);
-    let (codec, report) = fit_codec(&btf, options)?;
+    if let Some(sample) = btfs.iter().flat_map(|btf| &btf.samples).find(|sample| !sample.is_finite()) {
+        let remedy = "fill what is no number by Btf::check".to_owned();
+        return Err(TextureError::Degenerate { fault: format!("a sample is {sample}"), remedy });
+    }
+    let raw_bytes = btfs.iter().map(Btf::raw_bytes).sum();
+    let encoding = coded_range(&btfs);
+    let in_range = |btf: Btf| match encoding {
+        Some(range) => btf.encoded(range),
+        None => btf,
+    };
+    let btfs: Vec<Btf> = btfs.into_iter().map(in_range).collect();
+    let (codec, report) = fit_codec(&btfs, options)?;
+    let first = &btfs[0];
     let material = Material {
-        name: btf.name,
-        encoding: btf.encoding,
-        exposure: btf.exposure,
-        includes_cosine: btf.includes_cosine,
-        texel_pitch_mm: btf.texel_pitch_mm.map(|pitch| pitch as f32),
+        name: first.name.clone(),
+        encoding: first.encoding,
+        exposure: first.exposure,
+        includes_cosine: first.includes_cosine,
+        texel_pitch_mm: first.texel_pitch_mm.map(|pitch| pitch as f32),
         raw_bytes,
         codec,
     };
     Ok((material, report))
 }
 
+impl Material {
+    /// The materials that share this one's books, in the order in which they were fitted; alone, its own name.
+    pub fn members(&self) -> Vec<&str> {
+        match &self.codec {
+            Codec::MultilevelVq(books) if books.materials() > 1 => books.labels().iter().map(|l| &*l.name).collect(),
+            _ => vec![&self.name],
+        }
+    }
+
+    /// One of them, counted from 0, by itself: as large a file, for the books stay whole. `None` where there are not so many.
+    pub fn member(&self, member: usize) -> Option<Self> {
+        let Codec::MultilevelVq(books) = &self.codec else { return (member == 0).then(|| self.clone()) };
+        let codec = Codec::MultilevelVq(books.with_material(member)?);
+        Some(match books.labels().get(member).cloned() {
+            Some(Label { name, exposure, texel_pitch_mm }) => {
+                Self { name, exposure, texel_pitch_mm, codec, ..self.clone() }
+            }
+            None => Self { codec, ..self.clone() },
+        })
+    }
+}
+
 /// The data as codecs see them: linear radiance becomes [`Encoding::Log`], with the median of what is not
 /// black as its floor and the largest sample as its peak.
 pub fn to_coded_range(btf: Btf) -> Btf {
-    if btf.encoding != Encoding::Linear {
-        return btf;
+    match coded_range(std::slice::from_ref(&btf)) {
+        Some(range) => btf.encoded(range),
+        None => btf,
     }
-    let mut lit: Vec<f32> = btf.samples.iter().copied().filter(|&s| s > 0.0).collect();
+}
+
+/// The logarithm for linear radiance; none where something else is among the data.
+fn coded_range(btfs: &[Btf]) -> Option<Encoding> {
+    if btfs.iter().any(|btf| btf.encoding != Encoding::Linear) {
+        return None;
+    }
+    let mut lit: Vec<f32> = btfs.iter().flat_map(|btf| &btf.samples).copied().filter(|&s| s > 0.0).collect();
     let middle = lit.len() / 2;
     let peak = lit.iter().copied().fold(f32::MIN_POSITIVE, f32::max);
     let floor = if lit.is_empty() { peak } else { *lit.select_nth_unstable_by(middle, f32::total_cmp).1 };
-    btf.encoded(Encoding::Log { floor: floor.max(peak * 1e-7), peak })
+    Some(Encoding::Log { floor: floor.max(peak * 1e-7), peak })
 }
 
-fn fit_codec(btf: &Btf, options: &FitOptions) -> Result<(Codec, FitReport), TextureError> {
-    let FitOptions { codec, budget, precision, seed } = *options;
+fn fit_codec(btfs: &[Btf], options: &FitOptions) -> Result<(Codec, FitReport), TextureError> {
+    let FitOptions { codec, budget, precision, seed, books } = *options;
+    let refuse = |fault: String, remedy: &str| Err(TextureError::Degenerate { fault, remedy: remedy.into() });
+    let btf = match btfs {
+        [] => return refuse("there is no material to fit".into(), "give at least one"),
+        [_, _, ..] if codec != CodecKind::MultilevelVq => {
+            return refuse(format!("materials cannot share what {codec} keeps"), "fit one, or choose multilevel-vq");
+        }
+        _ if codec != CodecKind::MultilevelVq && books != multilevel_vq::Variant::default() => {
+            return refuse(format!("{codec} has no books"), "choose multilevel-vq, or leave out what it alone has");
+        }
+        [first, ..] => first,
+    };
     Ok(match codec {
         CodecKind::GaussianMixture => {
             let (codec, report) =
@@ -350,7 +414,10 @@ fn fit_codec(btf: &Btf, options: &FitOptions) -> Result<(Codec, FitReport), Text
             (Codec::GaussianMixture(codec), report)
         }
         CodecKind::MultilevelVq => {
-            let (codec, report) = multilevel_vq::fit(btf, &multilevel_vq::Options::new(btf, budget, precision, seed)?)?;
+            let usual = multilevel_vq::Options::new(btf, budget, precision, seed)?;
+            let multilevel_vq::Variant { measure, color, mip_maps } = books;
+            let options = multilevel_vq::Options { measure, color, mip_maps, ..usual };
+            let (codec, report) = multilevel_vq::fit_shared(btfs, &options)?;
             (Codec::MultilevelVq(codec), report)
         }
         CodecKind::Pca => {

@@ -143,11 +143,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_printed_ratio_lies_between_the_accounts_of_its_weights() {
-        // 11.2 is printed of 625 texels: below five components with a mean and weights of four bytes.
-        let ratio = |bytes: usize| f64::from(625 * 81 * 3) / bytes as f64;
-        assert_eq!(format!("{:.1}", ratio(printed_bytes(625, 81, 5, 4))), "11.8");
-        assert_eq!(format!("{:.1}", ratio(13_560)), "11.2");
+    fn the_printed_ratio_is_that_of_six_components_in_bytes() {
+        let ratio = |k: usize, bytes: usize| f64::from(625 * 81 * 3) / printed_bytes(625, 81, k, bytes) as f64;
+        // 11.2 is printed of 625 texels, without the number of components.
+        let is_it = |&(k, bytes): &(usize, usize)| format!("{:.1}", ratio(k, bytes)) == "11.2";
+        let accounts = (1..=16).flat_map(|k| [1, 2, 4].map(|bytes| (k, bytes)));
+        assert_eq!(accounts.filter(is_it).collect::<Vec<_>>(), [(6, 1)]);
+        assert_eq!(format!("{:.1}", ratio(5, 4)), "11.8");
         assert!((f64::from(1u32 << 24) * 243.0 / printed_bytes(1 << 24, 81, 5, 1) as f64 - 13.5).abs() < 0.001);
     }
 }

@@ -9,12 +9,13 @@ use super::evaluate::{Evaluation, judge};
 use super::sheet;
 use crate::Error;
 use crate::output::OutputFolder;
-use crate::stages::Stages;
+use crate::stages::{Stages, peak_bytes};
 use capture::btf::Btf;
 use serde::Serialize;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
+use texture::btf::multilevel_vq::Variant;
 use texture::btf::{Budget, CodecKind, FitOptions, Material, Precision, fit, to_coded_range};
 
 /// What is compared.
@@ -120,12 +121,13 @@ fn run(
     let budget = ratio.map_or(Budget::Standard, Budget::Ratio);
     let stage = ratio.map_or_else(|| codec.to_string(), |ratio| format!("{codec} 1:{ratio}"));
     let started = Instant::now();
-    let fitting = FitOptions { codec, budget, precision: options.precision, seed: options.seed };
+    let fitting =
+        FitOptions { codec, budget, precision: options.precision, seed: options.seed, books: Variant::default() };
     let stored = stages.run(&stage, |_| {
         let (material, _) = fit(coded.clone(), &fitting).map_err(|fault| fault.to_string())?;
-        let seconds = started.elapsed().as_secs_f64();
+        let (seconds, peak) = (started.elapsed().as_secs_f64(), peak_bytes());
         let reread = Material::from_bytes(&material.to_bytes().0).map_err(|fault| fault.to_string())?;
-        Ok::<_, String>((reread, seconds))
+        Ok::<_, String>((reread, seconds, peak))
     });
     let mut run =
         CodecRun { ratio_asked: ratio, fault: None, evaluation: None, name: codec.name(), bytes_per_texel: None };
@@ -134,10 +136,10 @@ fn run(
             run.fault = Some(fault);
             (run, None)
         }
-        Ok((material, seconds)) => {
+        Ok((material, seconds, peak)) => {
             let judged = stages.run(&format!("judge {stage}"), |_| judge(&material, coded, options.seed));
             run.bytes_per_texel = Some(judged.bytes as f64 / coded.texels() as f64);
-            run.evaluation = Some(Evaluation { fit_s: Some(seconds), ..judged });
+            run.evaluation = Some(Evaluation { fit_s: Some(seconds), fit_peak_bytes: peak, ..judged });
             (run, Some(material))
         }
     }

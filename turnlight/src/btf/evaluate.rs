@@ -5,6 +5,7 @@ use crate::Error;
 use crate::stages::peak_bytes;
 use capture::btf::Btf;
 use serde::Serialize;
+use texture::btf::multilevel_vq::halved;
 use texture::btf::statistics::{TextureStatistics, compare};
 use texture::btf::{Answer, Codec, Material, Part, Sampler, Score, Synthesized, score, to_coded_range};
 
@@ -27,6 +28,8 @@ pub struct Evaluation {
     /// Sample by sample.
     #[serde(flatten)]
     pub score: Score,
+    /// Of each smaller size, where they are kept: against the data averaged over radiance.
+    pub levels: Option<Vec<Level>>,
     /// Of codecs that keep the statistics alone: the mean over 64 pictures.
     pub statistics: Option<TextureStatistics>,
     /// Answers per second; of codecs that are asked sample by sample.
@@ -34,10 +37,21 @@ pub struct Evaluation {
     pub speed: Option<Speed>,
     /// Directions of light drawn per second on one core, where the codec draws them.
     pub samples_per_s_core: Option<f64>,
-    /// Of the fit, where it was timed.
+    /// Of the fit, where its record is beside the file ([`FitRecord`](super::FitRecord)).
     pub fit_s: Option<f64>,
-    /// The most memory the process has held.
+    /// The most memory that the process that fitted has held up to the end of the fit.
+    pub fit_peak_bytes: Option<u64>,
+    /// The most memory this process has held.
     pub peak_bytes: Option<u64>,
+}
+
+/// A smaller size.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Level {
+    /// Texels across and down.
+    pub size: [usize; 2],
+    /// Root mean squared error, levels of 0..=255.
+    pub rmse: f64,
 }
 
 /// Judges `material` by `btf`, the data as read; `seed` draws what is asked for timing, and synthesizes.
@@ -83,6 +97,7 @@ pub(super) fn judge(material: &Material, btf: &Btf, seed: u64) -> Evaluation {
         ratio: ratio(bytes.len() as u64),
         ratio_as_printed: material.codec.bytes_as_printed().map(ratio),
         score,
+        levels: levels(material, btf),
         statistics,
         speed,
         samples_per_s_core: match &material.codec {
@@ -90,8 +105,22 @@ pub(super) fn judge(material: &Material, btf: &Btf, seed: u64) -> Evaluation {
             _ => None,
         },
         fit_s: None,
+        fit_peak_bytes: None,
         peak_bytes: peak_bytes(),
     }
+}
+
+/// The smaller sizes of a material, each against what the larger data become.
+fn levels(material: &Material, btf: &Btf) -> Option<Vec<Level>> {
+    let Codec::MultilevelVq(codec) = &material.codec else { return None };
+    let mut levels = Vec::new();
+    let mut averaged = None;
+    for at in (1..codec.sizes().len()).filter_map(|level| codec.level(level)) {
+        let smaller = halved(averaged.as_ref().unwrap_or(btf));
+        levels.push(Level { size: [smaller.width, smaller.height], rmse: score(&smaller, &at).rmse });
+        averaged = Some(smaller);
+    }
+    (!levels.is_empty()).then_some(levels)
 }
 
 /// How alike pictures are that need not agree texel by texel, over pairs spread evenly.

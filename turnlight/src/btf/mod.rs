@@ -6,6 +6,7 @@ mod delta;
 mod evaluate;
 mod page;
 mod plot;
+mod record;
 mod sheet;
 mod speed;
 
@@ -13,5 +14,6 @@ pub use compare::{CodecComparison, CodecRun, CompareOptions, compare, text};
 pub use delta::Delta;
 pub use evaluate::{Evaluation, evaluate};
 pub use page::html;
+pub use record::FitRecord;
 pub use sheet::{DIFFERENCE_GAIN, sheet};
 pub use speed::{Speed, speed};

@@ -4,15 +4,16 @@ use super::synth::refuse_occupied;
 use crate::Answer;
 use crate::arguments::{BtfCommand, BtfCompareArgs, BtfDataArgs, BtfEvalArgs, BtfFitArgs, BtfSynthArgs};
 use serde_json::json;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use turnlight::Error;
-use turnlight::btf::{CompareOptions, compare as compare_codecs, evaluate, html, sheet, text};
+use turnlight::btf::{CompareOptions, Evaluation, FitRecord, compare as compare_codecs, evaluate, html, sheet, text};
 use turnlight::capture::{btf as measured, write_rgb};
 use turnlight::data_synth::btf::{BtfMaterial, BtfOptions, DIRECTIONS, write_btf};
 use turnlight::output::{OutputFolder, write_file};
 use turnlight::stages::{Observer, Stages};
 use turnlight::texture::TextureError;
-use turnlight::texture::btf::{CodecKind, FitOptions, Material, fit as fit_codec, to_coded_range};
+use turnlight::texture::btf::multilevel_vq::Variant;
+use turnlight::texture::btf::{CodecKind, FitOptions, Material, fit_shared, to_coded_range};
 
 pub(crate) fn run(command: &BtfCommand, observer: &dyn Observer) -> Result<Answer, Error> {
     match command {
@@ -69,29 +70,50 @@ fn read(args: &BtfDataArgs, stages: &mut Stages<'_>) -> Result<measured::Btf, Er
 
 fn fit(args: &BtfFitArgs, observer: &dyn Observer) -> Result<Answer, Error> {
     let mut stages = Stages::new(observer);
-    let btf = read(&args.data, &mut stages)?;
-    let raw_bytes = btf.raw_bytes();
+    if args.data.len() > 1 && args.codec != CodecKind::MultilevelVq {
+        let fault = format!("{} materials cannot share what {} keeps", args.data.len(), args.codec);
+        return Err(Error::Arguments(format!("{fault}; give one, or --codec multilevel-vq")));
+    }
+    let books = args.books.variant();
+    if books != Variant::default() && args.codec != CodecKind::MultilevelVq {
+        let fault = "--measure, --color and --mip-maps are of the books of multilevel-vq";
+        return Err(Error::Arguments(format!("{fault}; {} has none", args.codec)));
+    }
+    let part = |data: &PathBuf| BtfDataArgs { data: data.clone(), crop: args.crop };
+    let btfs = args.data.iter().map(|data| read(&part(data), &mut stages)).collect::<Result<Vec<_>, _>>()?;
     let options = FitOptions {
         codec: args.codec,
         budget: args.budget.budget(),
         precision: args.precision.into(),
         seed: args.seed,
+        books,
     };
-    let (material, report) = stages.run("fit", |_| fit_codec(btf, &options))?;
+    let (material, report) = stages.run("fit", |_| fit_shared(btfs, &options))?;
+    let raw_bytes = material.raw_bytes;
     let (bytes, parts) = material.to_bytes();
     write_file(&args.output, &bytes)?;
+    let took = stages.finished().last().map(|fit| FitRecord::new(&bytes, fit.seconds, fit.peak_bytes));
+    took.map_or(Ok(()), |record| record.write(&args.output))?;
     report.notes.iter().for_each(|note| observer.noted(note));
     let ratio = raw_bytes as f64 / bytes.len() as f64;
     let path = args.output.display();
-    let text = format!("{}, {}: {} bytes, 1:{ratio:.1}\nwrote {path}", material.name, args.codec, bytes.len());
+    let text = format!(
+        "{}, {}: {} bytes, 1:{ratio:.1}\nwrote {path}",
+        material.members().join(" and "),
+        args.codec,
+        bytes.len()
+    );
     let json = json!({
         "codec": args.codec.name(),
+        "members": material.members(),
         "bytes": bytes.len(),
         "parts": parts,
         "raw_bytes": raw_bytes,
         "ratio": ratio,
         "objective": report.objective,
         "notes": report.notes,
+        "fit_s": took.map(|record| record.fit_s),
+        "fit_peak_bytes": took.and_then(|record| record.fit_peak_bytes),
         "material": args.output,
         "stages": stages.finished(),
     });
@@ -100,18 +122,29 @@ fn fit(args: &BtfFitArgs, observer: &dyn Observer) -> Result<Answer, Error> {
 
 fn eval(args: &BtfEvalArgs, observer: &dyn Observer) -> Result<Answer, Error> {
     let mut stages = Stages::new(observer);
-    let material = read_material(&args.material)?;
+    let bytes = read_bytes(&args.material)?;
+    let material = member(material_in(&args.material, &bytes)?, args.member)?;
     let btf = read(&args.data, &mut stages)?;
     if let Some(path) = &args.sheet {
         let coded = if btf.encoding == material.encoding { btf.clone() } else { to_coded_range(btf.clone()) };
         write_rgb(path, &sheet(&material, &coded, args.seed))?;
     }
-    let found = stages.run("evaluate", |_| evaluate(&material, btf, args.seed))?;
+    let judged = stages.run("evaluate", |_| evaluate(&material, btf, args.seed))?;
+    let record = FitRecord::read(&args.material, &bytes);
+    let found = Evaluation {
+        fit_s: record.map(|record| record.fit_s),
+        fit_peak_bytes: record.and_then(|record| record.fit_peak_bytes),
+        ..judged
+    };
     let s = &found.score;
     let mut text = format!(
         "{}: {} bytes, 1:{:.1}; RMSE {:.3}, PSNR {:.2} dB, SSIM {:.4}",
         found.codec, found.bytes, found.ratio, s.rmse, s.psnr_db, s.ssim
     );
+    for level in found.levels.iter().flatten() {
+        let [width, height] = level.size;
+        text.push_str(&format!("; {width} × {height}: RMSE {:.3}", level.rmse));
+    }
     if let Some(speed) = found.speed {
         let [one, all] = [speed.evals_per_s_core, speed.evals_per_s_all].map(|rate| rate / 1e6);
         text.push_str(&format!("; {one:.2} M answers/s on one core, {all:.2} on all"));
@@ -119,10 +152,25 @@ fn eval(args: &BtfEvalArgs, observer: &dyn Observer) -> Result<Answer, Error> {
     Ok(Answer { text, json: json!(found) })
 }
 
-pub(super) fn read_material(path: &Path) -> Result<Material, Error> {
-    let bytes = std::fs::read(path).map_err(|fault| Error::Failed(format!("{}: {fault}", path.display())))?;
+/// One of the materials in a file.
+pub(super) fn read_material(path: &Path, number: usize) -> Result<Material, Error> {
+    member(material_in(path, &read_bytes(path)?)?, number)
+}
+
+fn member(material: Material, number: usize) -> Result<Material, Error> {
+    let known = material.members().join(", ");
+    let missing = || Error::Arguments(format!("--member: there is no material {number}, from 0 on there are {known}"));
+    material.member(number).ok_or_else(missing)
+}
+
+fn read_bytes(path: &Path) -> Result<Vec<u8>, Error> {
+    std::fs::read(path).map_err(|fault| Error::Failed(format!("{}: {fault}", path.display())))
+}
+
+/// The material in the bytes of the file at `path`.
+fn material_in(path: &Path, bytes: &[u8]) -> Result<Material, Error> {
     let remedy = "fit it again with `turnlight btf fit`".to_owned();
-    let material = Material::from_bytes(&bytes).map_err(|fault| TextureError::Invalid {
+    let material = Material::from_bytes(bytes).map_err(|fault| TextureError::Invalid {
         path: path.to_owned(),
         fault: fault.to_string(),
         remedy,

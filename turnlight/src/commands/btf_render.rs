@@ -20,7 +20,7 @@ const VIEW_DEG: [f64; 2] = [62.0, -90.0];
 
 pub(crate) fn run(args: &BtfRenderArgs, observer: &dyn Observer) -> Result<Answer, Error> {
     check_extension(&args.output, &["png"])?;
-    let material = read_material(&args.material)?;
+    let material = read_material(&args.material, args.member)?;
     let surface = args.shape.surface(args.tiles)?;
     let mut stages = Stages::new(observer);
     let tile = Tile::of(&material, args.seed);

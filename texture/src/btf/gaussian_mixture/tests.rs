@@ -8,8 +8,9 @@ use super::prediction::{Along, Places};
 use super::variables::{FLOORS, Grid, INPUTS, VARIABLES, onion_slice};
 use super::*;
 use crate::btf::container::{Reader, Stored, Writer};
+use crate::btf::multilevel_vq::Variant;
 use crate::btf::{Codec, Material};
-use crate::btf::{CodecKind, FitOptions};
+use crate::btf::{CodecKind, FitOptions, score};
 use capture::btf::Encoding;
 use proptest::prelude::*;
 use std::borrow::Cow;
@@ -213,6 +214,24 @@ fn one_round_on_four_numbers_is_the_known_one() {
             assert!((component.mean[0] - mean).abs() < 1e-6 && (component.sigma[0] - 0.5).abs() < 1e-6);
             assert!((component.weight - 0.5).abs() < 1e-9);
         }
+    }
+}
+
+/// What the difference of two large sums of squares loses in 32 bits.
+#[test]
+fn a_small_deviation_far_from_zero_is_kept() {
+    let (mut grid, _, mut floors) = four_numbers();
+    grid.samples = Cow::Owned([249.99, 250.01, 249.99, 250.01].iter().flat_map(|&c| [c; 3]).collect());
+    floors[INPUTS..].fill(1e-4);
+    let (mut mean, mut sigma) = ([0.0; VARIABLES], floors);
+    (mean[0], sigma[0]) = (5.0, 5.0);
+    mean[INPUTS..].fill(250.3);
+    sigma[INPUTS..].fill(1.0);
+    let start = [Component { weight: 1.0, mean, sigma }];
+    let found = maximise(&grid, &start, &expect(&grid, &Packed::new(&start, grid.periods), all(&[0]), ALL), &floors);
+    for colour in INPUTS..VARIABLES {
+        assert!((found[0].mean[colour] - 250.0).abs() < 1e-4, "{}", found[0].mean[colour]);
+        assert!((found[0].sigma[colour].powi(2) / 1e-4 - 1.0).abs() < 0.1, "{}", found[0].sigma[colour].powi(2));
     }
 }
 
@@ -647,9 +666,14 @@ fn a_range_of_a_million_is_coded_as_its_logarithm() {
         budget: Budget::Components(40),
         precision: Precision::Compact,
         seed: 1,
+        books: Variant::default(),
     };
-    let (material, _) = crate::btf::fit(btf, &asked).unwrap();
+    let (material, _) = crate::btf::fit(btf.clone(), &asked).unwrap();
     assert!(matches!(material.encoding, Encoding::Log { .. }));
+    let Codec::GaussianMixture(codec) = &material.codec else { unreachable!("it was asked for") };
+    let found = score(&btf.encoded(material.encoding), codec);
+    // Of the 20 stops of a range of 10⁶.
+    assert!(found.rmse_stops.is_some_and(|stops| stops < 1.0), "{found:?}");
 }
 
 #[test]
@@ -689,6 +713,11 @@ fn as_many_components_as_the_data_support() {
     let btf = striped();
     let (codec, report) = fit(&btf, &auto(&btf)).unwrap();
     assert!(codec.components() >= 16, "{:?}", report.notes);
+    // Where held-out pairs gain nothing more, likelihood goes on gaining.
+    let note = report.notes.iter().find(|note| note.contains("BIC")).unwrap();
+    let criteria: Vec<f64> =
+        note.split('(').skip(2).map(|tail| tail.split(')').next().unwrap().parse().unwrap()).collect();
+    assert!(criteria.len() >= 3 && criteria.is_sorted_by(|a, b| a > b), "{note}");
 }
 
 #[test]

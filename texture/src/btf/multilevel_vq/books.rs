@@ -6,13 +6,13 @@
 //! | P2, P3, P4, P6 | `n_α`, `n_θ`, `n_φ`, 1 entries | `⌈log₂ S⌉` of the book below | scale, 6 bits, logarithmic | f32 |
 //! | M | one of P2, one of I2 | `⌈log₂ S₂⌉ + ⌈log₂ S_I2⌉` | – | – |
 //! | I2, I1 | `n_α`, `n_β` entries | `⌈log₂ S⌉` | – | – |
-//! | C | Cr, Cb | – | 16 bits each | f32 |
+//! | C | Cr, Cb; u', v' | – | 16 bits each; 8 | f32 |
 //!
 //! Scales of range `R = c_max/c_min` are off by at most `ln R / 124` of themselves; code 0 is 0; a book whose
 //! scales are all equal stores one. From below upward each scale takes over what rounding did to its child,
 //! `⟨before, after⟩/⟨after, after⟩`. A single child needs no index, a single item of P4 no P6.
 
-use super::color::LENGTHS;
+use super::color::{Color, log_luv_code, log_luv_value};
 use super::grid::{Axis, Grid};
 use super::grow::{Growing, Link};
 use crate::btf::Precision;
@@ -28,12 +28,17 @@ const SCALE_RANGE: f32 = 4096.0;
 const SAME: f32 = 1e-5;
 /// Largest number a file may hold: products of four stay finite.
 const LARGEST: f32 = 1e6;
+/// Set beside the axis where colours are LogLuv; their range follows.
+const LOG_LUV: u8 = 2;
+/// Largest range of luminance a file may hold; [`to_coded_range`](crate::btf::to_coded_range) goes to 10⁷.
+const LARGEST_RANGE: f32 = 1e12;
 
 /// The books that materials share.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Books {
     pub(super) grid: Grid,
     pub(super) precision: Precision,
+    pub(super) color: Color,
     /// P1.
     pub(super) rows: Vec<f32>,
     /// P2.
@@ -105,9 +110,10 @@ impl Kept {
 pub(super) fn settle(
     growing: &Growing,
     planes: &[(usize, usize, Vec<Link>)],
+    color: Color,
     precision: Precision,
 ) -> (Books, Vec<Plane>) {
-    let grid = growing.grid;
+    let (grid, lengths) = (growing.grid, color.lengths());
     let texels = Kept::of(planes.iter().flat_map(|p| &p.2).map(|l| l.child), growing.texel_count());
     let texel_links: Vec<Link> = texels.entries(&growing.texels, grid.phi).collect();
     let views = Kept::of(texel_links.iter().map(|l| l.child), growing.views.len() / grid.theta);
@@ -132,7 +138,7 @@ pub(super) fn settle(
     let (texel_book, texel_moments) = snap(&renumbered(&texel_links, &views), Some(grid.phi), &view_moments, precision);
     let plane = |(width, height, links): &(usize, usize, Vec<Link>)| {
         // Up to here luminance had the length it adds to RGB.
-        let absolute = |l: &Link| Link { child: l.child, scale: l.scale / LENGTHS[0] };
+        let absolute = |l: &Link| Link { child: l.child, scale: l.scale / lengths[0] };
         let links: Vec<Link> = renumbered(links, &texels).iter().map(absolute).collect();
         let (mut book, _) = snap(&links, None, &texel_moments, precision);
         if book.links.iter().all(|link| *link == book.links[0]) {
@@ -143,9 +149,10 @@ pub(super) fn settle(
     let books = Books {
         grid,
         precision,
+        color,
         rows: row_values,
         slices: slice_book,
-        colors: colors.items.iter().map(|&c| snap_color(growing.colors.vector(c), precision)).collect(),
+        colors: colors.items.iter().map(|&c| snap_color(growing.colors.vector(c), color, precision)).collect(),
         color_rows: row_links.iter().map(|&c| colors.positions[c as usize]).collect(),
         color_slices: color_links.iter().map(|&r| color_rows.positions[r as usize]).collect(),
         pairs: used_pairs().map(|p| [slices.positions[p[0] as usize], color_slices.positions[p[1] as usize]]).collect(),
@@ -186,11 +193,13 @@ fn inner(a: &[f32], b: &[f32]) -> f64 {
     a.iter().zip(b).map(|(x, y)| f64::from(*x) * f64::from(*y)).sum()
 }
 
-fn snap_color(whitened: &[f32], precision: Precision) -> [f32; 2] {
-    let color = [whitened[0] / LENGTHS[1], whitened[1] / LENGTHS[2]];
-    match precision {
-        Precision::Full => color,
-        Precision::Compact => color.map(|c| color_value(color_code(c))),
+fn snap_color(whitened: &[f32], color: Color, precision: Precision) -> [f32; 2] {
+    let [_, first, second] = color.lengths();
+    let chroma = [whitened[0] / first, whitened[1] / second];
+    match (precision, color) {
+        (Precision::Full, _) => chroma,
+        (Precision::Compact, Color::YCrCb) => chroma.map(|c| color_value(color_code(c))),
+        (Precision::Compact, Color::LogLuv { .. }) => chroma.map(|c| log_luv_value(log_luv_code(c))),
     }
 }
 
@@ -386,7 +395,10 @@ impl Books {
         out.u8(u8::from(self.precision == Precision::Compact));
         [grid.alpha, grid.beta, grid.theta, grid.phi].iter().for_each(|&n| out.u8(n as u8));
         out.u8(grid.rim_deg);
-        out.u8(u8::from(grid.axis == Axis::Along));
+        out.u8(u8::from(grid.axis == Axis::Along) | if self.color == Color::YCrCb { 0 } else { LOG_LUV });
+        if let Color::LogLuv { range } = self.color {
+            out.f32(range);
+        }
         out.part("P1");
         out.u32((self.rows.len() / grid.beta) as u32);
         match self.precision {
@@ -418,9 +430,10 @@ impl Books {
         out.part("C");
         out.u32(self.colors.len() as u32);
         for value in self.colors.iter().flatten() {
-            match self.precision {
-                Precision::Full => out.f32(*value),
-                Precision::Compact => out.u16(color_code(*value) as u16),
+            match (self.precision, self.color) {
+                (Precision::Full, _) => out.f32(*value),
+                (Precision::Compact, Color::YCrCb) => out.u16(color_code(*value) as u16),
+                (Precision::Compact, Color::LogLuv { .. }) => out.u8(log_luv_code(*value)),
             }
         }
         out.part("I1");
@@ -441,17 +454,19 @@ impl Books {
         if !(1..=90).contains(&rim_deg) {
             return Err(Fault(format!("views down to {rim_deg}°")));
         }
-        let axis = if from.u8()? == 0 { Axis::Perpendicular } else { Axis::Along };
+        let flags = from.u8()?;
+        let axis = if flags & 1 == 0 { Axis::Perpendicular } else { Axis::Along };
+        let color = if flags & LOG_LUV == 0 { Color::YCrCb } else { read_log_luv(from)? };
         let grid = Grid { alpha, beta, theta, phi, rim_deg, axis };
         let rows = read_rows(beta, precision, from)?;
         let slices = read_book(alpha, rows.len() / beta, from)?;
-        let colors = read_colors(precision, from)?;
+        let colors = read_colors(precision, color, from)?;
         let color_rows = read_indices(beta, colors.len(), from)?;
         let color_slices = read_indices(alpha, color_rows.len() / beta, from)?;
         let pairs = read_pairs(slices.links.len() / alpha, color_slices.len() / alpha, from)?;
         let views = read_book(theta, pairs.len(), from)?;
         let texels = read_book(phi, views.links.len() / theta, from)?;
-        Ok(Self { grid, precision, rows, slices, colors, color_rows, color_slices, pairs, views, texels })
+        Ok(Self { grid, precision, color, rows, slices, colors, color_rows, color_slices, pairs, views, texels })
     }
 }
 
@@ -464,11 +479,20 @@ fn read_rows(beta: usize, precision: Precision, from: &mut Reader<'_>) -> Result
     from.f32s(values)?.into_iter().map(magnitude).collect()
 }
 
-fn read_colors(precision: Precision, from: &mut Reader<'_>) -> Result<Vec<[f32; 2]>, Fault> {
+fn read_log_luv(from: &mut Reader<'_>) -> Result<Color, Fault> {
+    let range = from.f32()?;
+    let sound = (1.0..=LARGEST_RANGE).contains(&range);
+    if sound { Ok(Color::LogLuv { range }) } else { Err(Fault(format!("a logarithm of luminance up to {range}"))) }
+}
+
+fn read_colors(precision: Precision, color: Color, from: &mut Reader<'_>) -> Result<Vec<[f32; 2]>, Fault> {
     let values = 2 * count(2, from)?;
-    let flat = match precision {
-        Precision::Full => from.f32s(values)?,
-        Precision::Compact => from.u16s(values)?.into_iter().map(|code| color_value(code as i16)).collect(),
+    let flat = match (precision, color) {
+        (Precision::Full, _) => from.f32s(values)?,
+        (Precision::Compact, Color::LogLuv { .. }) => from.take(values)?.iter().map(|&c| log_luv_value(c)).collect(),
+        (Precision::Compact, Color::YCrCb) => {
+            from.u16s(values)?.into_iter().map(|code| color_value(code as i16)).collect()
+        }
     };
     let color = |c: &[f32]| match c.iter().find(|c| c.abs() > LARGEST) {
         Some(bad) => Err(Fault(format!("a chroma of {bad}"))),
@@ -506,5 +530,31 @@ impl Plane {
     #[inline]
     pub(super) fn link(&self, texel: usize) -> Link {
         self.book.links[if self.book.links.len() == 1 { 0 } else { texel }]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Of a range R, half of one of 62 steps: ln R / 124 of the scale.
+    #[test]
+    fn scales_are_off_by_no_more_than_their_range_says() {
+        for range in [1.5_f32, 10.0, 100.0, 4000.0] {
+            let links: Vec<Link> =
+                (0..=5000).map(|i| Link { child: 0, scale: 0.03 * range.powf(i as f32 / 5000.0) }).collect();
+            let scales = Scales::of(&links, true, Precision::Compact);
+            let error = |l: &Link| (scales.value(scales.code(l.scale)) / l.scale).ln().abs();
+            let (worst, bound) = (links.iter().map(error).fold(0.0, f32::max), range.ln() / 124.0);
+            assert!(worst < bound * 1.001 + 1e-5 && worst > 0.95 * bound, "1 to {range}: {worst} {bound}");
+        }
+    }
+
+    #[test]
+    fn no_scale_is_exact_and_small_ones_stay() {
+        let links = [0.0, 1e-3, 1.0].map(|scale| Link { child: 0, scale });
+        let scales = Scales::of(&links, true, Precision::Compact);
+        let back = links.map(|l| scales.value(scales.code(l.scale)));
+        assert!(back[0] == 0.0 && (back[1] / 1e-3 - 1.0).abs() < 1e-4 && (back[2] - 1.0).abs() < 1e-6, "{back:?}");
     }
 }

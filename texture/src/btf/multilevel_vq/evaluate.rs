@@ -2,14 +2,13 @@
 //!
 //! ```text
 //! (j, c₆) = P6[x]; (k, c₄) = P4[j][φ]; (m, c₃) = P3[k][θ]; (p, i) = M[m]; (r, c₂) = P2[p][α]; Y = c₆ c₄ c₃ c₂ P1[r][β]
-//! (Cr, Cb) = C[I1[I2[i][α]][β]]                                                     (equation 4)
+//! (Cr, Cb) or (u', v') = C[I1[I2[i][α]][β]]                                                     (equation 4)
 //! ```
 //!
 //! M is folded into P3 and C into I1, so a corner is three dependent loads for each of both. All tables of
 //! a 64 × 64 tile take hundreds of kilobytes and stay in the second-level cache.
 
 use super::books::{Books, Plane};
-use super::color::rgb;
 use super::grid::{Place, turned};
 use super::grow::Link;
 use crate::btf::VqTables;
@@ -109,7 +108,7 @@ impl Tables {
                 self.add_corners(view, [weight * scale, weight], &place.light[p], &mut sum);
             }
         }
-        rgb(sum).map(|c| c.max(0.0))
+        books.color.rgb(sum).map(|c| c.max(0.0))
     }
 
     /// Adds the four cells about a light, luminance and chroma weighted.

@@ -163,3 +163,48 @@ fn cell_of(grid: Grid, light: &Vector3<f32>) -> [usize; 2] {
     let at = |x: f32, count: usize| ((x * count as f32).max(0.0) as usize).min(count - 1);
     [at(alpha / PI + 0.5, grid.alpha), at(0.5 * (s + 1.0), grid.beta)]
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The largest number of 0..1 in 32 bits.
+    const LAST: f32 = 1.0 - f32::EPSILON / 2.0;
+
+    fn drawn_cells(masses: &[f32]) {
+        let ends = cumulative(masses);
+        assert!(ends.is_sorted_by(|a, b| a < b) && ends[0] > 0.0 && ends.last() == Some(&1.0), "{ends:?}");
+        for u in [0.0, f32::MIN_POSITIVE, 1e-7, 0.1, 0.5, 0.999_999, LAST] {
+            let (cell, into) = invert(&ends, u);
+            assert!(cell < masses.len() && (0.0..=1.0).contains(&into), "{u}: {cell} {into}");
+        }
+        assert_eq!((invert(&ends, 0.0), invert(&ends, LAST).0), ((0, 0.0), masses.len() - 1));
+        assert!(shares(&ends, masses.len()).iter().all(|share| *share > 0.0));
+    }
+
+    #[test]
+    fn a_slice_of_nothing_is_drawn_evenly() {
+        drawn_cells(&[0.0; 11]);
+        assert!(shares(&cumulative(&[0.0; 11]), 11).iter().all(|share| (share - 1.0 / 11.0).abs() < 1e-6));
+    }
+
+    /// Nine tenths are drawn of the one cell, the rest evenly of all.
+    #[test]
+    fn a_slice_with_one_lit_cell_is_drawn_there_and_still_everywhere() {
+        for lit in [0, 4, 10] {
+            for mass in [1e-30, 1.0, 1e30] {
+                let mut masses = [0.0; 11];
+                masses[lit] = mass;
+                drawn_cells(&masses);
+                let found = shares(&cumulative(&masses), 11);
+                assert!((found[lit] - (0.9 + 0.1 / 11.0)).abs() < 1e-6, "{found:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn masses_beyond_all_numbers_are_drawn_evenly() {
+        drawn_cells(&[f32::INFINITY, 1.0, 0.0]);
+        drawn_cells(&[f32::NAN, 1.0, 0.0]);
+    }
+}

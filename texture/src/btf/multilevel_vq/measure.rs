@@ -24,9 +24,10 @@ const STABILISERS: [f32; 2] = [1e-4, 9e-4];
 const ROUNDING: f64 = 2e-4;
 
 /// How an item is compared to a slice.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Measure {
     /// Root of the mean squared error over RGB, that of chroma counted 1.6-fold.
+    #[default]
     Rmse,
     /// Structural similarity within slices.
     Ssim,

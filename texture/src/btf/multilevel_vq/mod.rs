@@ -30,7 +30,8 @@
 //! one; by default ([`Phase::COMBINING`]) it may add combinations of the slices there are to P4, P3 and M. *Rate*:
 //! one threshold moves all ([`Aim`]); a ratio is reached by searching it. *Refinement*: books that have grown hold what came first;
 //! made means of what they stand for, they err by a sixth less, in fewer bytes. *Several materials* share all but P6 ([`fit_shared`]);
-//! a BRDF is a material of one texel. *Mip-maps* are P6 of radiance averaged over 2 × 2 texels, out of the same books.
+//! a BRDF is a material of one texel. *Colour* is YCrCb, or LogLuv of a high range ([`ColorSpace`]). *Mip-maps* are P6 of
+//! radiance averaged over 2 × 2 texels, out of the same books.
 //!
 //! *Cost*: per texel 7 M multiplications to resample and `144 (121 S₂ + 242 S_I2)` to compare with all books, once while they
 //! grow and once a round of refinement; a sample is 16 chains of look-ups. *Limits*: between the cells, 12° to 16° wide,
@@ -44,7 +45,7 @@
 //! 98th, percentile of SSIM; interpolation, for equation 4 is nearest.
 
 mod books;
-pub mod color;
+mod color;
 mod evaluate;
 mod grid;
 mod grow;
@@ -56,16 +57,18 @@ mod resample;
 mod search;
 mod size;
 
+pub use color::ColorSpace;
 pub use grid::{Axis, Grid};
 pub use grow::Growth;
 pub use measure::Measure;
-pub use options::{Aim, Options, Phase};
+pub use options::{Aim, Options, Phase, Variant};
 
-use super::container::{Fault, Reader, Stored, Writer};
+use super::container::{Fault, Reader, Stored, Writer, read_name, stored_name};
 use super::{Codec, FitReport, Frame, Material, Sampler};
 use crate::TextureError;
 use books::{Books, Plane, settle};
 use capture::btf::{Btf, Encoding};
+use color::Color;
 use evaluate::Tables;
 use grow::{Growing, Link, Query};
 use importance::Distributions;
@@ -108,7 +111,28 @@ pub struct MultilevelVq {
     includes_cosine: bool,
     /// P6 per material, and within it per size, the measured one first.
     materials: Arc<Vec<Vec<Plane>>>,
+    /// What each is, where there are several.
+    labels: Arc<Vec<Label>>,
     shown: usize,
+}
+
+/// What a material of shared books is.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Label {
+    /// What was measured.
+    pub name: String,
+    /// What its radiance was multiplied by before it was encoded.
+    pub exposure: f32,
+    /// Between texels, where known.
+    pub texel_pitch_mm: Option<f32>,
+}
+
+/// One of the smaller sizes, averaged over radiance; answers as the measured one does.
+#[derive(Clone, Debug)]
+pub struct Level<'a> {
+    codec: &'a MultilevelVq,
+    plane: &'a Plane,
+    frame: Frame,
 }
 
 /// Fits the codec.
@@ -123,17 +147,19 @@ pub fn fit(btf: &Btf, options: &Options) -> Result<(MultilevelVq, FitReport), Te
 /// bytes of all. The directions of the codec's frame are those of the first.
 ///
 /// # Errors
-/// Where there are none, they are encoded differently, or an option is out of range.
+/// Where there are none, they are encoded differently, or an option is out of range or does not fit their range.
 pub fn fit_shared(btfs: &[Btf], options: &Options) -> Result<(MultilevelVq, FitReport), TextureError> {
     options.check()?;
     let Some(first) = btfs.first() else {
         return Err(degenerate("there is no material to fit", "give at least one"));
     };
-    if btfs.iter().any(|b| std::mem::discriminant(&b.encoding) != std::mem::discriminant(&first.encoding)) {
+    if btfs.iter().any(|b| (b.encoding, b.includes_cosine) != (first.encoding, first.includes_cosine)) {
         return Err(degenerate("materials of one book are encoded differently", "encode all alike"));
     }
+    let color = Color::new(options.color, first.encoding)?;
     let numbers = 3 * options.grid.nodes() * options.grid.cells() * btfs.iter().map(Btf::texels).sum::<usize>();
-    let inputs = btfs.iter().map(|btf| Input::new(btf, options, numbers <= HELD)).collect::<Result<Vec<_>, _>>()?;
+    let inputs =
+        btfs.iter().map(|btf| Input::new(btf, options, color, numbers <= HELD)).collect::<Result<Vec<_>, _>>()?;
     let mut report = FitReport::default();
     let refined = match options.aim {
         Aim::Threshold(threshold) => Grown::new(&inputs, options, threshold).refined(&inputs, options),
@@ -172,8 +198,8 @@ struct Input<'a> {
 
 impl<'a> Input<'a> {
     /// `hold` where the texels of all materials may be held on the grid.
-    fn new(btf: &'a Btf, options: &Options, hold: bool) -> Result<Self, TextureError> {
-        let resampler = Resampler::new(options.grid, options.ridge, &btf.views, &btf.lights)?;
+    fn new(btf: &'a Btf, options: &Options, color: Color, hold: bool) -> Result<Self, TextureError> {
+        let resampler = Resampler::new(options.grid, options.ridge, color, &btf.views, &btf.lights)?;
         let halve = |btf: &Btf| (btf.texels() > 1).then(|| halved(btf));
         let smaller = match options.mip_maps {
             true => std::iter::successors(halve(btf), halve).collect(),
@@ -290,7 +316,8 @@ impl Grown {
             sizes.zip(links).map(|((width, height), links)| (width, height, links.clone())).collect::<Vec<_>>()
         };
         let planes: Vec<_> = inputs.iter().zip(&self.links).flat_map(of_input).collect();
-        let (books, planes) = settle(&self.books, &planes, options.precision);
+        let color = inputs.first().map_or_else(Color::default, |input| input.resampler.color());
+        let (books, planes) = settle(&self.books, &planes, color, options.precision);
         let mut planes = planes.into_iter();
         let materials = inputs.iter().map(|input| planes.by_ref().take(1 + input.smaller.len()).collect()).collect();
         let power = match first.encoding {
@@ -298,7 +325,9 @@ impl Grown {
             Encoding::Linear => 1.0,
             Encoding::Log { floor, peak } => log_power(peak / floor),
         };
-        MultilevelVq::new(Frame::of(first), books, power, first.includes_cosine, materials)
+        let labels =
+            if inputs.len() > 1 { inputs.iter().map(|input| Label::of(input.btf)).collect() } else { Vec::new() };
+        MultilevelVq::new(Frame::of(first), books, (power, first.includes_cosine), materials, labels)
     }
 }
 
@@ -349,7 +378,7 @@ fn byte_count(btf: &Btf, codec: &MultilevelVq) -> u64 {
 }
 
 /// Radiance averaged over 2 × 2 texels; of an odd side the last is left out, of a side of one it is kept.
-fn halved(btf: &Btf) -> Btf {
+pub fn halved(btf: &Btf) -> Btf {
     let (width, height) = ((btf.width / 2).max(1), (btf.height / 2).max(1));
     let average = |picture: &[f32], x: usize, y: usize, c: usize| {
         let near = [(2 * x, 2 * y), (2 * x + 1, 2 * y), (2 * x, 2 * y + 1), (2 * x + 1, 2 * y + 1)];
@@ -364,7 +393,7 @@ fn halved(btf: &Btf) -> Btf {
         name: btf.name.clone(),
         views: btf.views.clone(),
         lights: btf.lights.clone(),
-        measured: Vec::new(),
+        measured: btf.measured.clone(),
         samples: pictures.concat(),
         width,
         height,
@@ -377,7 +406,13 @@ fn degenerate(fault: &str, remedy: &str) -> TextureError {
 }
 
 impl MultilevelVq {
-    fn new(frame: Frame, books: Books, power: f32, includes_cosine: bool, materials: Vec<Vec<Plane>>) -> Self {
+    fn new(
+        frame: Frame,
+        books: Books,
+        (power, includes_cosine): (f32, bool),
+        materials: Vec<Vec<Plane>>,
+        labels: Vec<Label>,
+    ) -> Self {
         Self {
             frame,
             tables: Arc::new(Tables::of(&books)),
@@ -386,6 +421,7 @@ impl MultilevelVq {
             power,
             includes_cosine,
             materials: Arc::new(materials),
+            labels: Arc::new(labels),
             shown: 0,
         }
     }
@@ -393,6 +429,11 @@ impl MultilevelVq {
     /// How many materials share the books.
     pub fn materials(&self) -> usize {
         self.materials.len()
+    }
+
+    /// What each is; empty where there is one.
+    pub fn labels(&self) -> &[Label] {
+        &self.labels
     }
 
     /// The same books, answering for another material; `None` where there are not so many.
@@ -407,13 +448,11 @@ impl MultilevelVq {
         self.materials[self.shown].iter().map(|plane| [plane.width, plane.height]).collect()
     }
 
-    /// The sample of a texel of the mip-map's level; [`Sampler::value`] is level 0. A level or texel out of range is taken
-    /// as the last.
-    pub fn value_at(&self, level: usize, texel: usize, light: &Vector3<f32>, view: &Vector3<f32>) -> [f32; 3] {
-        let planes = &self.materials[self.shown];
-        let plane = &planes[level.min(planes.len() - 1)];
-        let texel = texel.min(plane.width * plane.height - 1);
-        self.tables.value(&self.books, plane, texel, &self.tables.place(&self.books, light, view))
+    /// One of the sizes, the measured one being 0; `None` where there are not so many.
+    pub fn level(&self, level: usize) -> Option<Level<'_>> {
+        let plane = self.materials[self.shown].get(level)?;
+        let frame = Frame { width: plane.width, height: plane.height, ..self.frame.clone() };
+        Some(Level { codec: self, plane, frame })
     }
 
     /// Items of C, I1, I2, P1, P2, M, P4 and P3.
@@ -432,6 +471,39 @@ impl MultilevelVq {
     }
 }
 
+impl Label {
+    fn of(btf: &Btf) -> Self {
+        let texel_pitch_mm = btf.texel_pitch_mm.map(|pitch| pitch as f32);
+        Self { name: stored_name(&btf.name).to_owned(), exposure: btf.exposure, texel_pitch_mm }
+    }
+
+    fn write(&self, out: &mut Writer) {
+        out.u8(self.name.len() as u8);
+        out.bytes(self.name.as_bytes());
+        out.f32s(&[self.exposure, self.texel_pitch_mm.unwrap_or(0.0)]);
+    }
+
+    fn read(from: &mut Reader<'_>) -> Result<Self, Fault> {
+        let name = read_name(from)?;
+        let [exposure, pitch] = [from.f32()?, from.f32()?];
+        if exposure <= 0.0 {
+            return Err(Fault(format!("the exposure of {name} is {exposure}")));
+        }
+        Ok(Self { name, exposure, texel_pitch_mm: Some(pitch).filter(|pitch| *pitch > 0.0) })
+    }
+}
+
+impl Sampler for Level<'_> {
+    fn frame(&self) -> &Frame {
+        &self.frame
+    }
+
+    fn value(&self, texel: usize, light: &Vector3<f32>, view: &Vector3<f32>) -> [f32; 3] {
+        let (tables, books) = (&self.codec.tables, &self.codec.books);
+        tables.value(books, self.plane, texel, &tables.place(books, light, view))
+    }
+}
+
 impl Sampler for MultilevelVq {
     fn frame(&self) -> &Frame {
         &self.frame
@@ -447,7 +519,9 @@ impl Sampler for MultilevelVq {
     }
 
     fn tables(&self) -> Option<super::Tables> {
-        Some(super::Tables::MultilevelVq(self.tables.exported(&self.books, self.plane())))
+        // Elsewhere nothing but YCrCb is known.
+        (self.books.color == Color::YCrCb)
+            .then(|| super::Tables::MultilevelVq(self.tables.exported(&self.books, self.plane())))
     }
 }
 
@@ -459,6 +533,7 @@ impl Stored for MultilevelVq {
         out.u8(u8::from(self.includes_cosine));
         out.u16(self.materials.len() as u16);
         out.u16(self.shown as u16);
+        self.labels.iter().for_each(|label| label.write(out));
         for planes in self.materials.iter() {
             out.u8(planes.len() as u8);
             planes.iter().for_each(|plane| plane.write(&self.books, out));
@@ -473,6 +548,8 @@ impl Stored for MultilevelVq {
         }
         let includes_cosine = from.u8()? != 0;
         let (materials, shown) = (from.u16()?, usize::from(from.u16()?));
+        let labelled = if materials > 1 { materials } else { 0 };
+        let labels = (0..labelled).map(|_| Label::read(from)).collect::<Result<_, _>>()?;
         let planes = |from: &mut Reader<'_>| (0..from.u8()?).map(|_| Plane::read(&books, from)).collect();
         let materials = (0..materials).map(|_| planes(from)).collect::<Result<Vec<Vec<Plane>>, Fault>>()?;
         let first = materials.get(shown).and_then(|planes| planes.first());
@@ -481,7 +558,7 @@ impl Stored for MultilevelVq {
         {
             return Err(Fault("the planes of its materials do not fit the tile".into()));
         }
-        Ok(Self { shown, ..Self::new(frame, books, power, includes_cosine, materials) })
+        Ok(Self { shown, ..Self::new(frame, books, (power, includes_cosine), materials, labels) })
     }
 }
 

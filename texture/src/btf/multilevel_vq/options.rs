@@ -1,5 +1,6 @@
 //! What is asked of the fit: how large, how judged, in which order.
 
+use super::color::ColorSpace;
 use super::grid::Grid;
 use super::grow::Growth;
 use super::measure::{Acceptance, Measure};
@@ -36,6 +37,8 @@ pub struct Options {
     pub aim: Aim,
     /// How items are compared to slices.
     pub measure: Measure,
+    /// How colours stand in the books.
+    pub color: ColorSpace,
     /// Which texels may grow the books; shares sum to 1.
     pub phases: [Phase; 3],
     /// Squared thresholds of P4, P3, M, P2, P1, I2, I1, C, as shares of the first; for SSIM all thresholds are one.
@@ -48,6 +51,17 @@ pub struct Options {
     pub mip_maps: bool,
     /// Where the Halton sequence of the texels starts; nothing else is random.
     pub seed: u64,
+}
+
+/// What may be chosen of the books beside their size.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Variant {
+    /// How items are compared to slices.
+    pub measure: Measure,
+    /// How colours stand in the books.
+    pub color: ColorSpace,
+    /// Whether smaller sizes are held too: a third more of P6.
+    pub mip_maps: bool,
 }
 
 /// How large it may be.
@@ -115,7 +129,8 @@ impl Options {
             grid,
             ridge,
             aim,
-            measure: Measure::Rmse,
+            measure: Measure::default(),
+            color: ColorSpace::default(),
             phases: Phase::COMBINING,
             squared_shares: SQUARED_SHARES,
             refinements: REFINEMENTS,

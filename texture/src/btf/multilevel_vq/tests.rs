@@ -1,5 +1,5 @@
 use super::books::index_bits;
-use super::color::{rgb, ycrcb};
+use super::color::{log_luv, log_luv_code, luminance_code, rgb, ycrcb};
 use super::options::radical_inverse;
 use super::*;
 use crate::btf::{Budget, Precision, fixtures};
@@ -157,6 +157,65 @@ fn luminance_and_chroma_return_rgb() {
 }
 
 #[test]
+fn log_luv_has_its_known_codes() {
+    for (y, code) in [(0.0, 0), (-1.0, 0), (1.0, 16_384), (2.0, 16_640), (0.5, 16_128), (1e-30, 1)] {
+        assert_eq!(luminance_code(y), code, "{y}");
+    }
+    // One step is 2^(1/256): 0.27 %.
+    assert_eq!(luminance_code(1.0028), 16_385);
+    assert_eq!(luminance_code(1.0026), 16_384);
+    // u' = 0.1978 and v' = 0.4683 of white, by 410; those of BT.709's primaries are in its tables.
+    assert_eq!(log_luv([1.0; 3]), [16_384, 81, 192]);
+    for (primary, u, v) in
+        [([1.0, 0.0, 0.0], 0.4507, 0.5229), ([0.0, 1.0, 0.0], 0.125, 0.5625), ([0.0, 0.0, 1.0], 0.1754, 0.1579)]
+    {
+        let [_, of_u, of_v] = log_luv(primary);
+        assert!(
+            [(of_u, u), (of_v, v)].iter().all(|(code, c)| (f64::from(*code) - 410.0 * c).abs() <= 1.0),
+            "{primary:?}"
+        );
+    }
+    // Black has the chroma of white.
+    assert_eq!(log_luv([0.0; 3]), [0, 81, 192]);
+    assert_eq!([0.0, 0.25, 1.0, -3.0, f32::NAN].map(log_luv_code), [0, 102, 255, 0, 0]);
+}
+
+#[test]
+fn log_luv_returns_colours_within_its_steps() {
+    let range = 1e5;
+    let color = Color::LogLuv { range };
+    for rgb in [[0.0, 0.0, 0.0], [1.0, 1.0, 1.0], [0.6, 0.55, 0.5], [0.9, 0.8, 0.85], [0.3, 0.5, 0.4]] {
+        let held = color.of_rgb(rgb);
+        let back = color.rgb(held);
+        assert!((0..3).all(|c| (color.of_rgb(back)[c] - held[c]).abs() < 2e-4), "{rgb:?}: {held:?} {back:?}");
+        // Half a step of u' or v' either way, each step 17 or less in the logarithms of RGB, where colours are pale.
+        let most = 3.0 * 17.0 * 0.5 / 410.0 / range.ln_1p();
+        let is_pale = rgb.iter().all(|c| (c - rgb[1]).abs() <= 0.1);
+        assert!(!is_pale || (0..3).all(|c| (back[c] - rgb[c]).abs() < most), "{rgb:?}: {back:?}");
+    }
+    for odd in [[f32::NAN; 3], [-1.0, 9.0, -9.0], [2.0, 0.0, 0.0]] {
+        assert!(color.rgb(odd).iter().all(|c| !c.is_infinite()));
+    }
+}
+
+#[test]
+fn a_high_range_is_held_in_log_luv_and_other_data_are_not() {
+    let mut btf = striped(4, &few());
+    let of = |btf: &Btf| Options { color: ColorSpace::LogLuv, ..options(btf, Aim::Threshold(1.0), Precision::Compact) };
+    assert!(fit(&btf, &of(&btf)).is_err_and(|fault| fault.to_string().contains("LogLuv")));
+    btf.encoding = Encoding::Linear;
+    let btf = crate::btf::to_coded_range(btf);
+    let (codec, _) = fit(&btf, &of(&btf)).unwrap();
+    let usual = fitted(&btf, 1.0, Precision::Compact);
+    // The step of chroma is a few levels of the logarithm; that of luminance none.
+    assert!(rmse(&btf, &codec) < rmse(&btf, &usual) + 3.0, "{} {}", rmse(&btf, &codec), rmse(&btf, &usual));
+    assert!(codec.tables().is_none() && usual.tables().is_some());
+    let bytes = stored(&codec);
+    let read = MultilevelVq::read(&mut Reader::new(&bytes), codec.frame().clone()).unwrap();
+    assert!(read == codec && stored(&read) == bytes);
+}
+
+#[test]
 fn the_sequence_starts_as_haltons() {
     let points: Vec<[f64; 2]> = (1..=5).map(|i| [radical_inverse(i, 2), radical_inverse(i, 3)]).collect();
     let known = [[0.5, 1.0 / 3.0], [0.25, 2.0 / 3.0], [0.75, 1.0 / 9.0], [0.125, 4.0 / 9.0], [0.625, 7.0 / 9.0]];
@@ -176,21 +235,53 @@ fn indices_take_the_bits_they_need() {
     }
 }
 
+/// Table 1 prints ratios and sizes, but how many items the books had nowhere: what can be counted again is the raw side.
 #[test]
 fn ratios_are_the_published_ones() {
-    let ratio = |side: u64, bits: u64, bytes: u64| (side * side * 6561 * 3 * bits / 8) as f64 / bytes as f64;
-    for (side, bits, bytes, published) in [
-        (256, 8, 3_084_692, 418.2),
-        (256, 8, 632_352, 2039.9),
-        (256, 12, 853_496, 2267.0),
-        (256, 12, 2_653_188, 729.3),
-        (64, 8, 80_460, 1002.0),
+    let raw = |side: usize, encoding: Encoding| {
+        Btf { width: side, height: side, encoding, ..fixtures::btf([0, 0], &bonn_directions(), Vec::new()) }.raw_bytes()
+    };
+    let (ldr, hdr) = (Encoding::Srgb, Encoding::Log { floor: 1.0, peak: 1e6 });
+    for (side, encoding, bytes, published) in [
+        (256, ldr, 3_084_692, "418.2"),
+        (256, ldr, 632_352, "2039.9"),
+        (256, hdr, 853_496, "2267.0"),
+        // 780 in print.
+        (256, hdr, 2_653_188, "729.3"),
+        (64, ldr, 80_460, "1002.0"),
     ] {
-        assert!((ratio(side, bits, bytes) - published).abs() < 0.06, "{published}: {}", ratio(side, bits, bytes));
+        assert_eq!(format!("{:.1}", raw(side, encoding) as f64 / f64::from(bytes)), published);
     }
-    assert!((100.0 * 16.69 / 41.0 - 40.7_f64).abs() < 0.01, "100 materials of MERL");
-    let (hdr, ldr) = (Encoding::Linear.raw_bits(), Encoding::Srgb.raw_bits());
-    assert_eq!((hdr, ldr), (12, 8));
+}
+
+/// The file's parts are what the table of `books` says of the items there are: 6 bits a scale where scales differ, and the bits
+/// of an index.
+#[test]
+fn parts_take_the_bits_of_their_entries() {
+    let codec = fitted(&striped(8, &few()), 1.0, Precision::Compact);
+    let grid = codec.books.grid;
+    let mut out = Writer::default();
+    codec.write(&mut out);
+    let counts: std::collections::BTreeMap<_, _> = codec.entries().into_iter().collect();
+    let count = |book: &str| counts[book];
+    // u32 items; of scales their bits and range.
+    let bytes = |bits: usize| bits.div_ceil(8);
+    let (indices, scaled) = (|n: usize| index_bits(n) as usize, |n: usize| 6 + index_bits(n) as usize);
+    let known = [
+        ("grid", 7),
+        ("P1", 4 + count("P1") * grid.beta),
+        ("P2", 4 + 9 + bytes(count("P2") * grid.alpha * scaled(count("P1")))),
+        ("C", 4 + 4 * count("C")),
+        ("I1", 4 + bytes(count("I1") * grid.beta * indices(count("C")))),
+        ("I2", 4 + bytes(count("I2") * grid.alpha * indices(count("I1")))),
+        ("M", 4 + bytes(count("M") * (indices(count("P2")) + indices(count("I2"))))),
+        ("P3", 4 + 9 + bytes(count("P3") * grid.theta * scaled(count("M")))),
+        ("P4", 4 + 9 + bytes(count("P4") * grid.phi * scaled(count("P3")))),
+        ("P6", 4 + 1 + 2 + 2 + 1 + 4 + 9 + bytes(64 * scaled(count("P4")))),
+    ];
+    let found: Vec<(&str, usize)> = out.parts().iter().map(|part| (part.name, part.bytes as usize)).collect();
+    assert!(count("P2") > 2 && count("P4") > 2, "{counts:?}");
+    assert_eq!(found, known);
 }
 
 #[test]
@@ -354,6 +445,63 @@ fn two_materials_share_their_books() {
 }
 
 #[test]
+fn shared_files_tell_their_materials_apart() {
+    let directions = bonn_directions();
+    let names = ["ribs", "felt"];
+    let [one, two] = names.map(|name| Btf { name: name.into(), ..striped(4, &directions) });
+    let two = Btf { exposure: 2.5, texel_pitch_mm: Some(0.5), width: 8, height: 2, ..two };
+    let asked = crate::btf::FitOptions {
+        codec: crate::btf::CodecKind::MultilevelVq,
+        budget: Budget::Quality(60.0),
+        precision: Precision::Compact,
+        seed: 1,
+        books: Variant::default(),
+    };
+    let (material, _) = crate::btf::fit_shared(vec![one.clone(), two.clone()], &asked).unwrap();
+    assert_eq!(material.raw_bytes, one.raw_bytes() + two.raw_bytes());
+    let read = Material::from_bytes(&material.to_bytes().0).unwrap();
+    assert!(read == material && read.members() == names);
+    let felt = read.member(1).unwrap();
+    assert_eq!((&*felt.name, felt.exposure, felt.texel_pitch_mm), ("felt", 2.5, Some(0.5)));
+    assert_eq!((felt.codec.frame().width, felt.codec.frame().height), (8, 2));
+    // As the shown one of its own file.
+    let again = Material::from_bytes(&felt.to_bytes().0).unwrap();
+    assert!(again == felt && again.member(0).unwrap().name == "ribs" && again.member(2).is_none());
+    for codec in [crate::btf::CodecKind::Pca, crate::btf::CodecKind::GaussianMixture] {
+        let asked = crate::btf::FitOptions { codec, ..asked };
+        assert!(crate::btf::fit_shared(vec![one.clone(), two.clone()], &asked).is_err(), "{codec}");
+        let ssim = crate::btf::FitOptions { books: Variant { measure: Measure::Ssim, ..Variant::default() }, ..asked };
+        assert!(crate::btf::fit(one.clone(), &ssim).is_err(), "{codec}");
+    }
+    assert!(crate::btf::fit_shared(Vec::new(), &asked).is_err());
+}
+
+/// One logarithm holds for all of a book.
+#[test]
+fn high_ranges_share_a_logarithm() {
+    let linear = |factor: f32| {
+        let mut btf = Btf { encoding: Encoding::Linear, ..striped(2, &few()) };
+        btf.samples.iter_mut().for_each(|s| *s *= factor);
+        btf
+    };
+    let asked = crate::btf::FitOptions {
+        codec: crate::btf::CodecKind::MultilevelVq,
+        budget: Budget::Quality(80.0),
+        precision: Precision::Compact,
+        seed: 1,
+        books: Variant { color: ColorSpace::LogLuv, ..Variant::default() },
+    };
+    let (material, _) = crate::btf::fit_shared(vec![linear(1.0), linear(4.0)], &asked).unwrap();
+    let (light, view) = (Vector3::z(), Vector3::z());
+    let radiance = |member: usize| {
+        let member = material.member(member).unwrap();
+        let Codec::MultilevelVq(codec) = &member.codec else { unreachable!("it was asked for") };
+        member.encoding.decode(codec.value(0, &light, &view)[1])
+    };
+    assert!((radiance(1) / radiance(0) / 4.0 - 1.0).abs() < 0.1, "{} {}", radiance(0), radiance(1));
+}
+
+#[test]
 fn smaller_sizes_average_radiance() {
     let btf = striped(8, &few());
     let options = Options { mip_maps: true, ..options(&btf, Aim::Threshold(1.0), Precision::Compact) };
@@ -361,7 +509,8 @@ fn smaller_sizes_average_radiance() {
     assert_eq!(codec.sizes(), [[8, 8], [4, 4], [2, 2], [1, 1]]);
     let (light, view) = (Vector3::z(), Vector3::z());
     let mean: f32 = (0..64).map(|t| btf.encoding.decode(codec.value(t, &light, &view)[1])).sum::<f32>() / 64.0;
-    let small = btf.encoding.decode(codec.value_at(3, 0, &light, &view)[1]);
+    let small = btf.encoding.decode(codec.level(3).unwrap().value(0, &light, &view)[1]);
+    assert!(codec.level(4).is_none());
     assert!((small / mean - 1.0).abs() < 0.15, "{small} {mean}");
 }
 

@@ -4,6 +4,7 @@ use crate::btf::car2d::{Car2d, Causal};
 use crate::btf::car3d::{Car3d, VectorModel};
 use crate::btf::container::Stored;
 use crate::btf::gmrf::{Gmrf, Markov};
+use crate::btf::multilevel_vq::Variant;
 use crate::btf::{Codec, CodecKind, FitOptions, Material, Synthesizer, fixtures, statistics};
 use capture::btf::Encoding;
 use proptest::prelude::*;
@@ -169,7 +170,7 @@ fn striped() -> Btf {
 }
 
 fn fitted(btf: &Btf, codec: CodecKind, budget: Budget) -> (Material, FitReport) {
-    let options = FitOptions { codec, budget, precision: Precision::Compact, seed: 1 };
+    let options = FitOptions { codec, budget, precision: Precision::Compact, seed: 1, books: Variant::default() };
     super::super::fit(btf.clone(), &options).unwrap()
 }
 
@@ -213,7 +214,7 @@ fn files_return_what_was_written() {
     let btf = striped();
     for kind in KINDS {
         for (precision, budget) in [(Precision::Full, Budget::Components(4)), (Precision::Compact, Budget::Auto)] {
-            let options = FitOptions { codec: kind, budget, precision, seed: 1 };
+            let options = FitOptions { codec: kind, budget, precision, seed: 1, books: Variant::default() };
             let (material, _) = super::super::fit(btf.clone(), &options).unwrap();
             let back = Material::from_bytes(&material.to_bytes().0).unwrap();
             assert_eq!(synthesize(&material, [20, 20], (1, 1), &btf), synthesize(&back, [20, 20], (1, 1), &btf));
