@@ -111,8 +111,8 @@ fn linear(encoded: f32) -> f32 {
         LazyLock::new(|| (0..=STEPS).map(|k| crate::srgb::linear(k as f64 / STEPS as f64) as f32).collect());
     let place = encoded * STEPS as f32;
     let k = place as usize;
-    // The straight part ends within a step.
-    if encoded <= 0.040_45 || k >= STEPS {
+    // The straight part ends within a step, with a bend.
+    if encoded <= 0.041 || k >= STEPS {
         return crate::srgb::linear(f64::from(encoded)) as f32;
     }
     TABLE[k] + (place - k as f32) * (TABLE[k + 1] - TABLE[k])
