@@ -471,6 +471,14 @@ fn a_film_without_a_board_takes_cameras_from_elsewhere() {
             assert!((frame.camera.center() - drawn[at].camera.center()).norm() < 1e-6, "{cameras} {at}");
         }
     }
+    // Of the nine the pictures' numbers are no longer those of the frames.
+    for (cameras, third) in [("again", "folder"), ("again/transforms.json", "file")] {
+        let (report, captured) = done(place, &["film.mp4", "--cameras", cameras], third);
+        assert!(captured.frames.len() >= 8 && positions(&report).iter().enumerate().any(|(i, &at)| i != at));
+        for (frame, at) in captured.frames.iter().zip(positions(&report)) {
+            assert!((frame.camera.center() - drawn[at].camera.center()).norm() < 1e-6, "{cameras} {at}");
+        }
+    }
     // The first of them and an even turn of 15° a sixth of a second.
     let refused = turnlight(place, &["capture", "film.mp4", "--step", "90", "-o", "even"]);
     assert_eq!(refused.code, Some(2), "a step and no camera: {}", refused.stderr);

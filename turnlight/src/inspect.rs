@@ -176,8 +176,11 @@ pub fn capture_text(format: &str, check: &CaptureCheck) -> String {
     }
     lines.push(format!("silhouettes agree with a coarse hull of them to {:.3} (IoU)", check.silhouette_iou));
     if let Some(off) = check.outline_offset_px {
-        let side = if off < 0 { "inside" } else { "outside" };
-        lines.push(format!("their outlines lie {} pixels {side} of the edges in the pictures", off.abs()));
+        lines.push(match off {
+            0 => "their outlines lie on the edges in the pictures".to_owned(),
+            1.. => format!("their outlines lie {off} pixels outside of the edges in the pictures"),
+            _ => format!("their outlines lie {} pixels inside of the edges in the pictures", -off),
+        });
     }
     match check.findings.as_slice() {
         [] => lines.push("nothing looks wrong".to_owned()),

@@ -5,7 +5,7 @@ mod footage;
 mod photographs;
 
 pub use footage::{
-    Evidence, FetchFrame, Print, SilhouetteOptions, Silhouettes, StageSetup, check_silhouettes, clean_plate_likeness,
-    find_moving, find_silhouettes,
+    Evidence, FetchFrame, Moving, Print, SilhouetteOptions, Silhouettes, StageSetup, check_silhouettes,
+    clean_plate_likeness, find_moving, find_silhouettes,
 };
 pub use photographs::{find_mattes, find_mattes_in_box};

@@ -132,8 +132,14 @@ fn misfit(board: &Board, seen: &[Vec<FoundMarker>]) -> Option<f64> {
 fn without_strays(board: &Board, seen: &mut [Vec<FoundMarker>]) -> Option<Board> {
     let known = board.markers();
     for markers in seen.iter_mut() {
-        let side = markers.iter().map(|m| (m.corners[0] - m.corners[1]).norm()).fold(f64::INFINITY, f64::min);
-        let Some((map, _)) = middles_map(board, markers, calib3d::RANSAC, FIT * side) else { continue };
+        let mut sides: Vec<f64> = markers.iter().map(|m| (m.corners[0] - m.corners[1]).norm()).collect();
+        sides.sort_by(f64::total_cmp);
+        let side = sides.get(sides.len() / 2).copied().unwrap_or_default();
+        // A picture that does not tell where the board lies tells no markers of it.
+        let Some((map, _)) = middles_map(board, markers, calib3d::RANSAC, FIT * side) else {
+            markers.clear();
+            continue;
+        };
         let off = |m: &FoundMarker| {
             let corners = known.get(m.id)?.corners;
             let expected = apply(&map, &nalgebra::center(&corners[0], &corners[2]).xy())?;

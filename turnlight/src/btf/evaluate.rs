@@ -72,7 +72,7 @@ pub fn evaluate(material: &Material, btf: Btf, seed: u64) -> Result<Evaluation, 
 }
 
 /// The data encoded as the material is.
-fn as_coded(material: &Material, btf: Btf) -> Btf {
+pub fn as_coded(material: &Material, btf: Btf) -> Btf {
     if matches!(material.encoding, capture::btf::Encoding::Log { .. }) {
         return btf.encoded(material.encoding);
     }

@@ -12,7 +12,7 @@ mod speed;
 
 pub use compare::{CodecComparison, CodecRun, CompareOptions, compare, text};
 pub use delta::Delta;
-pub use evaluate::{Evaluation, evaluate};
+pub use evaluate::{Evaluation, as_coded, evaluate};
 pub use page::html;
 pub use record::FitRecord;
 pub use sheet::{DIFFERENCE_GAIN, sheet};

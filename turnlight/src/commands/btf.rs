@@ -6,14 +6,16 @@ use crate::arguments::{BtfCommand, BtfCompareArgs, BtfDataArgs, BtfEvalArgs, Btf
 use serde_json::json;
 use std::path::{Path, PathBuf};
 use turnlight::Error;
-use turnlight::btf::{CompareOptions, Evaluation, FitRecord, compare as compare_codecs, evaluate, html, sheet, text};
+use turnlight::btf::{
+    CompareOptions, Evaluation, FitRecord, as_coded, compare as compare_codecs, evaluate, html, sheet, text,
+};
 use turnlight::capture::{btf as measured, write_rgb};
 use turnlight::data_synth::btf::{BtfMaterial, BtfOptions, DIRECTIONS, write_btf};
 use turnlight::output::{OutputFolder, write_file};
 use turnlight::stages::{Observer, Stages};
 use turnlight::texture::TextureError;
 use turnlight::texture::btf::multilevel_vq::Variant;
-use turnlight::texture::btf::{CodecKind, FitOptions, Material, fit_shared, to_coded_range};
+use turnlight::texture::btf::{CodecKind, FitOptions, Material, fit_shared};
 
 pub(crate) fn run(command: &BtfCommand, observer: &dyn Observer) -> Result<Answer, Error> {
     match command {
@@ -126,8 +128,7 @@ fn eval(args: &BtfEvalArgs, observer: &dyn Observer) -> Result<Answer, Error> {
     let material = member(material_in(&args.material, &bytes)?, args.member)?;
     let btf = read(&args.data, &mut stages)?;
     if let Some(path) = &args.sheet {
-        let coded = if btf.encoding == material.encoding { btf.clone() } else { to_coded_range(btf.clone()) };
-        write_rgb(path, &sheet(&material, &coded, args.seed))?;
+        write_rgb(path, &sheet(&material, &as_coded(&material, btf.clone()), args.seed))?;
     }
     let judged = stages.run("evaluate", |_| evaluate(&material, btf, args.seed))?;
     let record = FitRecord::read(&args.material, &bytes);

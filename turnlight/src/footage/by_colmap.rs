@@ -91,7 +91,7 @@ fn masks(
         let fetch = |i: usize| read_upright(&files[members[i]]);
         let Some(found) = stages.run("what moves", |_| find_moving(&fetch, members.len()))? else { continue };
         for (&i, matte) in members.iter().zip(&found) {
-            write_matte(&file(i), matte)?;
+            write_matte(&file(i), &matte.matte())?;
             masks[i] = Some(file(i));
         }
         still += 1;
@@ -106,8 +106,8 @@ fn masks(
         "the border of the pictures stays the same: COLMAP sees what moves inside (give --masks where that is more than the \
          object and what turns with it)"
     } else {
-        "the camera was carried: COLMAP sees the room as well, which is right only if the object stood still (otherwise \
-         --masks)"
+        "nothing tells that the camera stood still (it was carried, nothing moves, or the pictures are too few): COLMAP sees \
+         the room as well, which is right only if the object stood still (otherwise --masks)"
     };
     shots.notes.push(note.to_owned());
     stages.observer().noted(note);

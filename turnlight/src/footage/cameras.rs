@@ -146,16 +146,23 @@ struct ReportedFrame {
 
 impl FilmCameras {
     fn of(capture: &Capture, path: &Path) -> Self {
-        let text = std::fs::read_to_string(path.join("report.json")).ok();
+        let folder = if path.is_file() { path.parent().unwrap_or(path) } else { path };
+        let text = std::fs::read_to_string(folder.join("report.json")).ok();
+        let name = |part: Option<&std::ffi::OsStr>| part.map(|s| s.to_string_lossy().into_owned());
+        let number = |frame: &capture::Frame| name(frame.image_path.file_stem())?.parse::<usize>().ok();
         // What is called so and is none of ours says nothing.
         if let Some(report) = text.and_then(|text| serde_json::from_str::<Report>(&text).ok()) {
-            let camera = |frame: ReportedFrame| Some((frame.name, capture.frames.get(frame.kept?)?.camera));
+            // By the numbers of its pictures: some may have been taken out.
+            let camera = |frame: ReportedFrame| {
+                let kept = frame.kept?;
+                let found = capture.frames.iter().find(|picture| number(picture) == Some(kept))?;
+                Some((frame.name, found.camera))
+            };
             return Self::Reported(report.frames.into_iter().filter_map(camera).collect());
         }
-        let name = |part: Option<&std::ffi::OsStr>| part.map(|s| s.to_string_lossy().into_owned());
         let camera = |frame: &capture::Frame| {
-            let number = name(frame.image_path.file_stem())?.parse().ok()?;
-            Some(((name(frame.image_path.parent()?.file_name()).unwrap_or_default(), number), frame.camera))
+            let folder = name(frame.image_path.parent()?.file_name()).unwrap_or_default();
+            Some(((folder, number(frame)?), frame.camera))
         };
         Self::Numbered(capture.frames.iter().filter_map(camera).collect())
     }

@@ -36,7 +36,7 @@ mod tests;
 
 pub use clean_plate::clean_plate_likeness;
 pub use judgement::check_silhouettes;
-pub use moving::find_moving;
+pub use moving::{Moving, find_moving};
 pub use stage::{FetchFrame, Print, StageSetup};
 
 use super::photographs::find_mattes_in_box;

@@ -28,13 +28,29 @@ const LEAST_MOVING: f64 = 0.003;
 /// Pixels of the small pictures around what moves that are counted in: a feature is where two colours meet.
 const MARGIN: f64 = 2.0;
 
-/// What moves, per frame, as mattes of the frames' size (0 and 255): what does not look as its place does in most frames. An
+/// What moves in a frame.
+#[derive(Clone, Debug)]
+pub struct Moving {
+    /// Of a picture some times smaller.
+    small: Image<u8>,
+    /// Of the frame.
+    size: [usize; 2],
+}
+
+impl Moving {
+    /// Of the frame's size, 0 and 255.
+    pub fn matte(&self) -> Image<u8> {
+        enlarged(&self.small, self.size)
+    }
+}
+
+/// What moves, per frame: what does not look as its place does in most frames. An
 /// evenly coloured part that always covers the same place is not seen to move. `None` where the camera moved, where nothing
 /// does, and of fewer than four frames. Frames are of one size. Deterministic.
 ///
 /// # Errors
 /// What `fetch` fails with.
-pub fn find_moving(fetch: &FetchFrame, count: usize) -> Result<Option<Vec<Image<u8>>>, CaptureError> {
+pub fn find_moving(fetch: &FetchFrame, count: usize) -> Result<Option<Vec<Moving>>, CaptureError> {
     if count < LEAST_FRAMES {
         return Ok(None);
     }
@@ -53,9 +69,9 @@ pub fn find_moving(fetch: &FetchFrame, count: usize) -> Result<Option<Vec<Image<
         let pixels: Vec<u8> = image.pixels().iter().zip(room.pixels()).map(is_moving).collect();
         let count = pixels.iter().filter(|v| **v > 0).count();
         let matte = Image::from_pixels(image.width(), image.height(), pixels).unwrap_or_default();
-        (enlarged(&grow(&matte, MARGIN), *size), count as f64 / matte.pixels().len().max(1) as f64)
+        (Moving { small: grow(&matte, MARGIN), size: *size }, count as f64 / matte.pixels().len().max(1) as f64)
     };
-    let (mattes, shares): (Vec<Image<u8>>, Vec<f64>) = small.par_iter().map(moving).unzip();
+    let (mattes, shares): (Vec<Moving>, Vec<f64>) = small.par_iter().map(moving).unzip();
     let mean = shares.iter().sum::<f64>() / count as f64;
     Ok((mean > LEAST_MOVING).then_some(mattes))
 }

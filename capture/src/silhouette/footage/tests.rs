@@ -553,7 +553,8 @@ fn what_moves_before_a_still_camera_is_told_without_cameras() {
     let stage = Stage::new(true);
     let (images, truths) = stage.shots();
     let found = find_moving(&|i| Ok(images[i].clone()), FRAMES).unwrap().unwrap();
-    for ((camera, truth), matte) in stage.cameras().iter().zip(&truths).zip(&found) {
+    for ((camera, truth), moving) in stage.cameras().iter().zip(&truths).zip(&found) {
+        let matte = moving.matte();
         let mut turning = truth.clone();
         for (x, y) in (0..SIZE.1).flat_map(|y| (0..SIZE.0).map(move |x| (x, y))) {
             let ray = camera.ray(Point2::new(x as f64 + 0.5, y as f64 + 0.5)).unwrap();

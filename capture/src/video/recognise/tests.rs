@@ -96,6 +96,10 @@ fn a_stray_marker_of_a_high_id_makes_no_board_longer() {
         let board: Board = text.parse().unwrap();
         let mut images = pictures(&board);
         put_marker(&mut images[1], "4x4_250".parse().unwrap(), 160);
+        // The board is hidden here.
+        let mut alone = Image::filled(640, 480, [120; 3]);
+        put_marker(&mut alone, "4x4_250".parse().unwrap(), 160);
+        images.push(alone);
         let Some(Pattern::Board(found)) = recognise_pattern(&images).unwrap() else { panic!("{text}") };
         assert_eq!((found.counts(), found.dictionary()), (board.counts(), board.dictionary()));
     }

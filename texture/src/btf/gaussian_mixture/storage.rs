@@ -14,6 +14,7 @@
 use super::GaussianMixture;
 use super::mixture::Component;
 use super::refit::LARGEST_COLOUR;
+use super::size::MOST;
 use super::variables::{INPUTS, Period, VARIABLES};
 use crate::btf::container::{Fault, Reader, Stored, Writer};
 use crate::btf::{Frame, Precision};
@@ -176,8 +177,8 @@ impl Stored for GaussianMixture {
         let count = from.u32()? as usize;
         let mean = from.take(3 * frame.pairs())?.to_vec();
         from.expect(count, component_bytes(precision))?;
-        if count == 0 {
-            return Err(Fault("it has no component".into()));
+        if !(1..=MOST).contains(&count) {
+            return Err(Fault(format!("it has {count} components, and 1 to {MOST} are made")));
         }
         let read = |_| match precision {
             Precision::Full => read_full(from),

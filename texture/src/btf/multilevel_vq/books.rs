@@ -136,12 +136,14 @@ pub(super) fn settle(
         used_pairs().map(|p| slice_moments[slices.positions[p[0] as usize] as usize]).collect();
     let (view_book, view_moments) = snap(&renumbered(&view_links, &pairs), Some(grid.theta), &pair_moments, precision);
     let (texel_book, texel_moments) = snap(&renumbered(&texel_links, &views), Some(grid.phi), &view_moments, precision);
+    let items = texel_book.links.len() / grid.phi;
     let plane = |(width, height, links): &(usize, usize, Vec<Link>)| {
         // Up to here luminance had the length it adds to RGB.
         let absolute = |l: &Link| Link { child: l.child, scale: l.scale / lengths[0] };
         let links: Vec<Link> = renumbered(links, &texels).iter().map(absolute).collect();
         let (mut book, _) = snap(&links, None, &texel_moments, precision);
-        if book.links.iter().all(|link| *link == book.links[0]) {
+        // One stands for all where they take no bits, which is how they are read.
+        if index_bits(items) + book.scales.bits() == 0 {
             book.links.truncate(1);
         }
         Plane { width: *width, height: *height, book }
@@ -456,6 +458,9 @@ impl Books {
         }
         let flags = from.u8()?;
         let axis = if flags & 1 == 0 { Axis::Perpendicular } else { Axis::Along };
+        if flags & !(1 | LOG_LUV) != 0 {
+            return Err(Fault(format!("flags {flags} are unknown; read it with a newer turnlight")));
+        }
         let color = if flags & LOG_LUV == 0 { Color::YCrCb } else { read_log_luv(from)? };
         let grid = Grid { alpha, beta, theta, phi, rim_deg, axis };
         let rows = read_rows(beta, precision, from)?;

@@ -156,6 +156,9 @@ pub fn fit_shared(btfs: &[Btf], options: &Options) -> Result<(MultilevelVq, FitR
     if btfs.iter().any(|b| (b.encoding, b.includes_cosine) != (first.encoding, first.includes_cosine)) {
         return Err(degenerate("materials of one book are encoded differently", "encode all alike"));
     }
+    if btfs.iter().any(|b| (&b.lights, &b.views) != (&first.lights, &first.views)) {
+        return Err(degenerate("materials of one book were measured under different directions", "fit them apart"));
+    }
     let color = Color::new(options.color, first.encoding)?;
     let numbers = 3 * options.grid.nodes() * options.grid.cells() * btfs.iter().map(Btf::texels).sum::<usize>();
     let inputs =
@@ -557,6 +560,12 @@ impl Stored for MultilevelVq {
             || first.is_none_or(|plane| [plane.width, plane.height] != [frame.width, frame.height])
         {
             return Err(Fault("the planes of its materials do not fit the tile".into()));
+        }
+        let is_half = |pair: &[Plane]| {
+            [pair[1].width, pair[1].height] == [pair[0].width, pair[0].height].map(|side| (side / 2).max(1))
+        };
+        if !materials.iter().all(|planes| planes.windows(2).all(is_half)) {
+            return Err(Fault("a mip level is not half of the one before".into()));
         }
         Ok(Self { shown, ..Self::new(frame, books, (power, includes_cosine), materials, labels) })
     }

@@ -476,6 +476,24 @@ fn shared_files_tell_their_materials_apart() {
     assert!(crate::btf::fit_shared(Vec::new(), &asked).is_err());
 }
 
+/// Its texels are one item, yet one of several that the book has.
+#[test]
+fn a_constant_material_beside_another_is_read_back() {
+    let directions = few();
+    let one = striped(4, &directions);
+    let constant = Btf { samples: one.samples.iter().map(|_| 0.3).collect(), ..one.clone() };
+    let options = options(&one, Aim::Threshold(2.0), Precision::Compact);
+    for materials in [[one.clone(), constant.clone()], [constant, one.clone()]] {
+        let (shared, _) = fit_shared(&materials, &options).unwrap();
+        let bytes = stored(&shared);
+        let read = MultilevelVq::read(&mut Reader::new(&bytes), shared.frame().clone()).unwrap();
+        assert!(read == shared);
+    }
+    let turned = Btf { lights: one.lights.iter().rev().copied().collect(), ..one.clone() };
+    let refused = fit_shared(&[one, turned], &options).unwrap_err();
+    assert!(refused.to_string().contains("different directions"), "{refused}");
+}
+
 /// One logarithm holds for all of a book.
 #[test]
 fn high_ranges_share_a_logarithm() {
