@@ -4,9 +4,17 @@ pub mod cartoon;
 pub mod hostile;
 pub mod played;
 
+use capture::Image;
 use data_synth::{Effort, Scene, SynthOptions, synthesize};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
+
+/// Intersection over union of two silhouettes of one size, object from 128 on; 0 where both are empty.
+pub fn iou(a: &Image<u8>, b: &Image<u8>) -> f64 {
+    let both = a.pixels().iter().zip(b.pixels()).map(|(&a, &b)| (a >= 128, b >= 128));
+    let (and, or) = both.fold((0, 0), |(and, or), (a, b)| (and + usize::from(a && b), or + usize::from(a || b)));
+    and as f64 / or.max(1) as f64
+}
 
 /// A run of the `turnlight` command.
 #[derive(Debug)]

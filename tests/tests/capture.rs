@@ -8,7 +8,7 @@ use capture::video::{FilmWriter, WriteOptions};
 use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
 use tests::cartoon::{Cartoon, Drawn};
-use tests::turnlight;
+use tests::{iou, turnlight};
 use turnlight::footage::{CapturedFootage, FootageOptions, capture_footage};
 use turnlight::stages::{Silent, Stages};
 
@@ -51,12 +51,6 @@ fn captured(path: &Path, options: &FootageOptions) -> CapturedFootage {
     let output = path.with_extension("capture");
     let found = capture_footage(&footage, options, &output, &mut Stages::new(&Silent));
     found.unwrap_or_else(|fault| panic!("{}: {fault}", path.display()))
-}
-
-fn iou(a: &Image<u8>, b: &Image<u8>) -> f64 {
-    let both = a.pixels().iter().zip(b.pixels()).map(|(&a, &b)| (a >= 128, b >= 128));
-    let (and, or) = both.fold((0, 0), |(and, or), (a, b)| (and + usize::from(a && b), or + usize::from(a || b)));
-    and as f64 / or.max(1) as f64
 }
 
 /// Shares of the true silhouettes that are too much and too little.

@@ -6,6 +6,7 @@ use capture::footage::Footage as Film;
 use capture::video::{FilmReader, FilmWriter, ReadOptions, WriteOptions, detect_board};
 use data_synth::Scene;
 use data_synth::footage::{Footage, FootageOptions, set_up};
+use tests::iou;
 use turnlight::footage::capture_footage;
 use turnlight::stages::{Silent, Stages};
 
@@ -48,12 +49,6 @@ fn the_board_is_found_where_the_truth_says_and_a_codec_leaves_it_there() {
         println!("from the film: {} corners, {errors:.3?}", errors.len());
         assert!(errors.len() >= 12 && errors[errors.len() / 2] < 0.12, "{errors:?}");
     }
-}
-
-fn iou(a: &Image<u8>, b: &Image<u8>) -> f64 {
-    let both = a.pixels().iter().zip(b.pixels()).map(|(&a, &b)| (a >= 128, b >= 128));
-    let (and, or) = both.fold((0, 0), |(and, or), (a, b)| (and + usize::from(a && b), or + usize::from(a || b)));
-    and as f64 / or as f64
 }
 
 /// The whole way: light traced, a board, cloth, noise, uneven speed, a codec.
