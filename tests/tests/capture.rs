@@ -385,7 +385,7 @@ fn what_is_said_of_a_film_is_heeded() {
     let focal = captured.frames[0].camera.intrinsics.fx;
     assert!((focal / cartoon.lens().fx - 1.0).abs() < 0.005, "{focal}");
     assert!(report["lens"]["focal_px"][0]["deviation"].is_null(), "{}", report["lens"]);
-    // --clean-plate.
+    // --clean-plate spoils nothing; that it is read shows below, where another's is refused.
     let mean = written_iou(&report, &captured, &drawn);
     println!("distance {distance:.4}, focal {focal:.2}, IoU {mean:.4}");
     assert!(mean > 0.96, "{mean}");

@@ -18,6 +18,12 @@ const TOLERANCE: f32 = 24.0;
 /// Places that change in no frame, below which nothing can be said.
 const LEAST_PLACES: usize = 64;
 
+/// Whether a pixel of a picture of this size lies where the object never is.
+pub(super) fn is_at_border([width, height]: [usize; 2], x: usize, y: usize) -> bool {
+    let ring = (width.min(height) / BORDER).max(1);
+    x < ring || y < ring || x + ring >= width || y + ring >= height
+}
+
 /// The share of what stays the same at the border of `frames` that `plate` (of their size) shows as well, 0 to 1. A table
 /// may reach out of the frame below and be no part of the plate; a set shows the rest. `None` where too little stays the
 /// same, or where sizes differ.
@@ -26,8 +32,6 @@ pub fn clean_plate_likeness(plate: &Image<[u8; 3]>, frames: &[Image<[u8; 3]>]) -
     if frames.iter().any(|frame| (frame.width(), frame.height()) != (width, height)) {
         return None;
     }
-    let ring = (width.min(height) / BORDER).max(1);
-    let is_border = |x: usize, y: usize| x < ring || y < ring || x + ring >= width || y + ring >= height;
     let agrees = |x: usize, y: usize| {
         let samples: Vec<[f32; 3]> = frames.iter().map(|frame| frame.at(x, y).map(f32::from)).collect();
         let usual = cluster::densest(&samples).filter(|c| 4 * usize::from(c.support) > 3 * samples.len())?.colour;
@@ -35,8 +39,11 @@ pub fn clean_plate_likeness(plate: &Image<[u8; 3]>, frames: &[Image<[u8; 3]>]) -
         Some((0..3).all(|c| (usual[c] - shown[c]).abs() <= TOLERANCE))
     };
     let row = |y: usize| {
-        let found: Vec<bool> =
-            (0..width).step_by(STEP).filter(|&x| is_border(x, y)).filter_map(|x| agrees(x, y)).collect();
+        let found: Vec<bool> = (0..width)
+            .step_by(STEP)
+            .filter(|&x| is_at_border([width, height], x, y))
+            .filter_map(|x| agrees(x, y))
+            .collect();
         (found.iter().filter(|agrees| **agrees).count(), found.len())
     };
     let rows: Vec<(usize, usize)> = (0..height).into_par_iter().step_by(STEP).map(row).collect();

@@ -1,6 +1,7 @@
 //! What moves before a camera that stands still, told without knowing any camera: room for those who have to find cameras
 //! on the object alone.
 
+use super::clean_plate::is_at_border;
 use super::{FetchFrame, cluster, fetched};
 use crate::matte::grow;
 use crate::{CaptureError, Image, load};
@@ -14,9 +15,6 @@ const WITNESSES: usize = 24;
 
 /// Fewer frames tell nothing.
 const LEAST_FRAMES: usize = 4;
-
-/// Parts of the shorter side that are border.
-const BORDER: usize = 25;
 
 /// The share of the border that looks alike in three quarters of the frames, if the camera stands still: a table may reach
 /// out of the picture below.
@@ -85,11 +83,7 @@ fn room(witnesses: &[&Image<[u8; 3]>]) -> Option<Image<Option<[f32; 3]>>> {
     };
     let places: Vec<_> = (0..width * height).into_par_iter().map(of_place).collect();
     let support = |at: usize| places[at].map_or(0, |c| usize::from(c.support));
-    let ring = (width.min(height) / BORDER).max(1);
-    let is_border = |at: &usize| {
-        let (x, y) = (at % width, at / width);
-        x < ring || y < ring || x + ring >= width || y + ring >= height
-    };
+    let is_border = |at: &usize| is_at_border([width, height], at % width, at / width);
     let border: Vec<usize> = (0..width * height).filter(is_border).collect();
     let alike = border.iter().filter(|&&at| 4 * support(at) > 3 * witnesses.len()).count();
     if (alike as f64) < STILL_BORDER * border.len() as f64 {
